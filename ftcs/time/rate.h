@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <compare>
+#include <optional>
+
+#include "ftcs/time/duration.h"
+
+namespace ftcs {
+
+/// The rate of one clock in units of another: dimensionless, exactly 1 when both run alike.
+///
+/// Rates compose by multiplication (paper eq. 8, 13, 17); parts per billion exist only in the names of
+/// constructors and getters, because adding them is a first-order approximation.
+class Rate {
+ public:
+  constexpr Rate() noexcept = default;
+  [[nodiscard]] static constexpr Rate from_ratio(double ratio) noexcept { return Rate{ratio}; }
+  [[nodiscard]] static constexpr Rate from_ppb(double ppb) noexcept { return Rate{1.0 + ppb * 1e-9}; }
+  [[nodiscard]] static constexpr Rate from_ppm(double ppm) noexcept { return Rate{1.0 + ppm * 1e-6}; }
+
+  [[nodiscard]] constexpr double ratio() const noexcept { return ratio_; }
+  /// Fractional frequency deviation y = ratio - 1 (NIST SP 1065, 3.1).
+  [[nodiscard]] constexpr double deviation() const noexcept { return ratio_ - 1.0; }
+  [[nodiscard]] constexpr double ppb() const noexcept { return (ratio_ - 1.0) * 1e9; }
+  [[nodiscard]] constexpr double ppm() const noexcept { return (ratio_ - 1.0) * 1e6; }
+  [[nodiscard]] constexpr Rate inverse() const noexcept { return Rate{1.0 / ratio_}; }
+
+  friend constexpr Rate operator*(Rate a, Rate b) noexcept { return Rate{a.ratio_ * b.ratio_}; }
+  friend constexpr Rate operator/(Rate a, Rate b) noexcept { return Rate{a.ratio_ / b.ratio_}; }
+  friend constexpr auto operator<=>(Rate, Rate) noexcept = default;
+  friend constexpr bool operator==(Rate, Rate) noexcept = default;
+
+ private:
+  constexpr explicit Rate(double ratio) noexcept : ratio_(ratio) {}
+  double ratio_ = 1.0;
+};
+
+/// elapsed * rate. The deviation alone is multiplied in floating point, so that the error is 2^-53 of the
+/// *correction*, not of the elapsed time.
+[[nodiscard]] constexpr Duration scale(Duration elapsed, Rate rate) noexcept {
+  return elapsed + Duration::from_ns(elapsed.ns() * rate.deviation());
+}
+
+/// Slowest and fastest permitted rate: the paper's F, linuxptp's max_frequency. Neither zero nor negative.
+struct RateLimits {
+  Rate slowest = Rate::from_ratio(0.5);
+  Rate fastest = Rate::from_ratio(1.5);
+
+  /// 1 ± ppb. Valid: 0 < ppb < 1e9.
+  [[nodiscard]] static constexpr RateLimits symmetric_ppb(double ppb) noexcept {
+    return {Rate::from_ppb(-ppb), Rate::from_ppb(ppb)};
+  }
+  /// Nearest permitted rate; a rate that is not a number becomes the nominal one.
+  [[nodiscard]] constexpr Rate clamp(Rate rate) const noexcept {
+    if (rate.ratio() != rate.ratio()) return clamp(Rate{});
+    if (rate < slowest) return slowest;
+    return rate > fastest ? fastest : rate;
+  }
+  [[nodiscard]] constexpr bool contains(Rate rate) const noexcept {
+    return rate >= slowest && rate <= fastest;
+  }
+  [[nodiscard]] constexpr bool valid() const noexcept {
+    return slowest.ratio() > 0.0 && slowest.ratio() <= 1.0 && fastest.ratio() >= 1.0 &&
+           fastest.ratio() < 1e6;
+  }
+};
+
+/// The narrower of two limits.
+[[nodiscard]] constexpr RateLimits intersect(RateLimits a, RateLimits b) noexcept {
+  return {a.slowest > b.slowest ? a.slowest : b.slowest, a.fastest < b.fastest ? a.fastest : b.fastest};
+}
+
+}  // namespace ftcs
