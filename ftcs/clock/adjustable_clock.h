@@ -19,23 +19,27 @@ enum class ClockError : std::uint8_t {
 
 /// A clock that can be read and steered: the edge between a servo's command and the world.
 ///
-/// Virtual because a system call dwarfs the dispatch and the set of clocks is open. Commands replace, never
-/// accumulate. A clock that takes a command guarantees its expiry: after correction_time it runs at
-/// tracking_rate even if nobody calls again (a virtual clock exactly, others by a timer).
+/// Virtual because a system call dwarfs the dispatch and the set of clocks is open. Commands
+/// replace, never accumulate. A clock that takes a command guarantees its expiry: after
+/// correction_time it runs at tracking_rate even if nobody calls again (a virtual clock exactly,
+/// others by a timer).
 class AdjustableClock {
  public:
   virtual ~AdjustableClock() = default;
 
   /// Both faces of the clock at one instant.
   [[nodiscard]] virtual ClockReading read() noexcept = 0;
-  /// What the steered clock showed (or, for an instant to come, would show) when the free-running oscillator
-  /// showed `instant`. Stamps arrive late (Follow_Up, transmit stamps), so that they may lie before the last
-  /// few commands: exact within the steering history, extrapolated from its oldest segment before it.
+  /// What the steered clock showed (or, for an instant to come, would show) when the free-running
+  /// oscillator showed `instant`. Stamps arrive late (Follow_Up, transmit stamps), so that they may
+  /// lie before the last few commands: exact within the steering history, extrapolated from its
+  /// oldest segment before it.
   [[nodiscard]] virtual LocalTime local_at(FreeRunningTime instant) const noexcept = 0;
   /// Permitted rates, local per free running.
   [[nodiscard]] virtual RateLimits rate_limits() const noexcept = 0;
-  /// Applies the command now. Returns the reading at which it took effect. On an error nothing has changed.
-  [[nodiscard]] virtual Result<ClockReading, ClockError> apply(const ServoCommand& command) noexcept = 0;
+  /// Applies the command now. Returns the reading at which it took effect. On an error nothing has
+  /// changed.
+  [[nodiscard]] virtual Result<ClockReading, ClockError> apply(
+      const ServoCommand& command) noexcept = 0;
 
  protected:
   AdjustableClock() = default;
@@ -43,7 +47,8 @@ class AdjustableClock {
   AdjustableClock& operator=(const AdjustableClock&) = default;
 };
 
-/// An injected free-running oscillator (CLOCK_MONOTONIC_RAW on a PC, simulated time in the laboratory).
+/// An injected free-running oscillator (CLOCK_MONOTONIC_RAW on a PC, simulated time in the
+/// laboratory).
 class FreeRunningSource {
  public:
   virtual ~FreeRunningSource() = default;

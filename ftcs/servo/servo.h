@@ -22,20 +22,22 @@ enum class ServoState : std::uint8_t {
 /// What became of the message that was fed.
 enum class SampleVerdict : std::uint8_t {
   kUsed,
-  kRejected,   ///< taken for an outlier: it never steers
-  kDuplicate,  ///< not newer than its predecessor
-  kImplausible ///< time went backward, absurd delay or interval
+  kRejected,    ///< taken for an outlier: it never steers
+  kDuplicate,   ///< not newer than its predecessor
+  kImplausible  ///< time went backward, absurd delay or interval
 };
 
 /// Telemetry: small, plain, copied by the one thread that owns the servo. Not known = not a number.
 struct ServoSnapshot {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   ServoState state = ServoState::kUnlocked;
-  Duration offset{};         ///< latest offset, local minus reference: perceived by classic servos, filtered by others
-  Duration path_delay{};     ///< latest mean path delay
-  Rate rate_ratio;           ///< reference per free running: k(n) a_l(n), the rate that tracks
-  double offset_gain = kUnknown;         ///< effective p of the latest command
-  double offset_sigma_ns = kUnknown;     ///< honest standard deviation of offset, if the servo knows it
+  Duration offset{};      ///< latest offset, local minus reference: perceived by classic servos,
+                          ///< filtered by others
+  Duration path_delay{};  ///< latest mean path delay
+  Rate rate_ratio;        ///< reference per free running: k(n) a_l(n), the rate that tracks
+  double offset_gain = kUnknown;  ///< effective p of the latest command
+  double offset_sigma_ns =
+      kUnknown;  ///< honest standard deviation of offset, if the servo knows it
   double rate_sigma_ppb = kUnknown;
   double path_delay_sigma_ns = kUnknown;
   double timestamp_noise_ns = kUnknown;  ///< learnt noise of one timestamp
@@ -47,27 +49,33 @@ struct ServoUpdate {
   ServoCommand command{};
 };
 
-/// A control law driven by offsets: FTCS (Table 1), PICS (eq. 26), the linuxptp-compatible PI. A value: no
-/// heap, no I/O, no logging, deterministic. `now` is the clock at the moment the command will be applied, so
-/// that what the clock did between sample and command (8,000 ppm over a few ms is microseconds) is known.
+/// A control law driven by offsets: FTCS (Table 1), PICS (eq. 26), the linuxptp-compatible PI. A
+/// value: no heap, no I/O, no logging, deterministic. `now` is the clock at the moment the command
+/// will be applied, so that what the clock did between sample and command (8,000 ppm over a few ms
+/// is microseconds) is known.
 template <class S>
-concept ControlLaw =
-    std::is_trivially_copyable_v<S> && std::is_trivially_copyable_v<typename S::Config> &&
+concept ControlLaw = std::is_trivially_copyable_v<S> &&
+    std::is_trivially_copyable_v<typename S::Config> &&
     requires(S law, const S& observed, const SyncSample& sample, const ClockReading& now) {
-      { law.update(sample, now) } noexcept -> std::same_as<ServoUpdate>;
-      { law.reset() } noexcept -> std::same_as<void>;
-      { observed.snapshot() } noexcept -> std::same_as<ServoSnapshot>;
-    };
+  { law.update(sample, now) }
+  noexcept->std::same_as<ServoUpdate>;
+  { law.reset() }
+  noexcept->std::same_as<void>;
+  { observed.snapshot() }
+  noexcept->std::same_as<ServoSnapshot>;
+};
 
-/// A whole servo: timestamp pairs of either direction in, commands out. TwoWayServo makes one of any
-/// ControlLaw (path-delay filter and gate in front); the adaptive servo is one by itself.
+/// A whole servo: timestamp pairs of either direction in, commands out. TwoWayServo makes one of
+/// any ControlLaw (path-delay filter and gate in front); the adaptive servo is one by itself.
 template <class S>
-concept ClockServo =
-    std::is_trivially_copyable_v<S> &&
+concept ClockServo = std::is_trivially_copyable_v<S> &&
     requires(S servo, const S& observed, const TimestampPair& pair, const ClockReading& now) {
-      { servo.update(pair, now) } noexcept -> std::same_as<ServoUpdate>;
-      { servo.reset() } noexcept -> std::same_as<void>;  // a new reference: everything learnt about it is void
-      { observed.snapshot() } noexcept -> std::same_as<ServoSnapshot>;
-    };
+  { servo.update(pair, now) }
+  noexcept->std::same_as<ServoUpdate>;
+  { servo.reset() }
+  noexcept->std::same_as<void>;  // a new reference: everything learnt about it is void
+  { observed.snapshot() }
+  noexcept->std::same_as<ServoSnapshot>;
+};
 
 }  // namespace ftcs

@@ -13,15 +13,17 @@ using Nanoseconds = std::chrono::nanoseconds;
 
 /// A signed length of time: whole nanoseconds and a fraction in units of 2^-32 ns.
 ///
-/// The value is `whole + fraction / 2^32` with 0 <= fraction, so whole is rounded towards minus infinity.
-/// Range ±292 years, resolution 2.3e-10 ns. Sums and differences are exact and wrap modulo 2^64 ns (a counter
-/// that wraps, or a hostile timestamp, is defined behaviour). The fraction is what correctionField (IEEE
-/// 1588-2019, 13.3.2.9, units of 2^-16 ns) and a rate-adjusted clock need: 1 ppb over 100 us is 1e-4 ns.
+/// The value is `whole + fraction / 2^32` with 0 <= fraction, so whole is rounded towards minus
+/// infinity. Range ±292 years, resolution 2.3e-10 ns. Sums and differences are exact and wrap
+/// modulo 2^64 ns (a counter that wraps, or a hostile timestamp, is defined behaviour). The
+/// fraction is what correctionField (IEEE 1588-2019, 13.3.2.9, units of 2^-16 ns) and a
+/// rate-adjusted clock need: 1 ppb over 100 us is 1e-4 ns.
 class Duration {
  public:
   constexpr Duration() noexcept = default;
   // Implicit on purpose: every whole number of nanoseconds is a Duration, without loss.
-  constexpr Duration(Nanoseconds whole) noexcept : whole_(whole.count()) {}  // NOLINT(google-explicit-constructor)
+  constexpr Duration(Nanoseconds whole) noexcept
+      : whole_(whole.count()) {}  // NOLINT(google-explicit-constructor)
 
   [[nodiscard]] static constexpr Duration from_parts(std::int64_t whole_ns,
                                                      std::uint32_t fraction) noexcept {
@@ -57,8 +59,9 @@ class Duration {
 
   friend constexpr Duration operator+(Duration a, Duration b) noexcept {
     const std::uint64_t fraction = std::uint64_t{a.fraction_} + b.fraction_;
-    return from_parts(wrap_add(wrap_add(a.whole_, b.whole_), static_cast<std::int64_t>(fraction >> 32)),
-                      static_cast<std::uint32_t>(fraction));
+    return from_parts(
+        wrap_add(wrap_add(a.whole_, b.whole_), static_cast<std::int64_t>(fraction >> 32)),
+        static_cast<std::uint32_t>(fraction));
   }
   friend constexpr Duration operator-(Duration a) noexcept {
     // -(whole + f) = ~whole + (1 - f); without a fraction the carry makes it -whole.

@@ -36,19 +36,21 @@ TEST(Duration, negation_and_sum_are_exact_inverses) {
     ASSERT_EQ(a + b - b, a);
     ASSERT_EQ(-(-a), a);
     ASSERT_EQ(a - a, Duration{});
-    ASSERT_EQ(a < b, b - a > Duration{});
+    ASSERT_EQ(a<b, b - a> Duration{});
     ASSERT_EQ(a.half() + a.half() + Duration::from_parts(0, a.fraction() & 1U), a);
   }
 }
 
 TEST(Duration, reads_the_units_of_correction_field) {
-  EXPECT_EQ(Duration::from_scaled_ns(0x0000'0000'0002'8000).ns(), 2.5);  // IEEE 1588-2019, 5.3.2: 2.5 ns
+  EXPECT_EQ(Duration::from_scaled_ns(0x0000'0000'0002'8000).ns(),
+            2.5);  // IEEE 1588-2019, 5.3.2: 2.5 ns
   EXPECT_EQ(Duration::from_scaled_ns(-0x8000).ns(), -0.5);
 }
 
 TEST(Duration, from_ns_saturates_and_never_invents_a_number) {
   EXPECT_EQ(Duration::from_ns(std::numeric_limits<double>::quiet_NaN()), Duration{});
-  EXPECT_EQ(Duration::from_ns(std::numeric_limits<double>::infinity()).floor_ns(), std::int64_t{1} << 62);
+  EXPECT_EQ(Duration::from_ns(std::numeric_limits<double>::infinity()).floor_ns(),
+            std::int64_t{1} << 62);
   EXPECT_EQ(Duration::from_ns(-1e300).floor_ns(), -(std::int64_t{1} << 62));
   EXPECT_EQ(Duration::from_ns(-1e-12).ns(), 0.0);
 }

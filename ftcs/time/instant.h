@@ -7,8 +7,8 @@
 
 namespace ftcs {
 
-/// A reading of one clock. The tag names the timescale: readings of different timescales cannot be subtracted
-/// or compared (`local - reference` does not compile; test/compile_fail shows it).
+/// A reading of one clock. The tag names the timescale: readings of different timescales cannot be
+/// subtracted or compared (`local - reference` does not compile; test/compile_fail shows it).
 template <class Timescale>
 class Instant {
  public:
@@ -47,8 +47,9 @@ using ReferenceTime = Instant<ReferenceTimescale>;
 using LocalTime = Instant<LocalTimescale>;
 using FreeRunningTime = Instant<FreeRunningTimescale>;
 
-/// Local minus reference, as IEEE 1588's offsetFromMaster (8.2.2.3): positive means the local clock is ahead.
-/// The only place where two timescales meet in a subtraction; the paper's T_offset has the opposite sign.
+/// Local minus reference, as IEEE 1588's offsetFromMaster (8.2.2.3): positive means the local clock
+/// is ahead. The only place where two timescales meet in a subtraction; the paper's T_offset has
+/// the opposite sign.
 [[nodiscard]] constexpr Duration offset_from_reference(LocalTime local,
                                                        ReferenceTime reference) noexcept {
   return local.since_epoch() - reference.since_epoch();

@@ -12,9 +12,13 @@ namespace {
 using namespace std::chrono_literals;
 
 template <class A, class B>
-concept Subtractable = requires(A a, B b) { a - b; };
+concept Subtractable = requires(A a, B b) {
+  a - b;
+};
 template <class A, class B>
-concept Comparable = requires(A a, B b) { a < b; };
+concept Comparable = requires(A a, B b) {
+  a < b;
+};
 
 TEST(Instant, timescales_do_not_mix) {
   static_assert(Subtractable<LocalTime, LocalTime>);
@@ -25,8 +29,10 @@ TEST(Instant, timescales_do_not_mix) {
 }
 
 TEST(Instant, offset_is_positive_when_the_local_clock_is_ahead) {
-  EXPECT_EQ(offset_from_reference(LocalTime::from_ns(1'100), ReferenceTime::from_ns(1'000)), Duration{100ns});
-  EXPECT_EQ(offset_from_reference(LocalTime::from_ns(900), ReferenceTime::from_ns(1'000)), Duration{-100ns});
+  EXPECT_EQ(offset_from_reference(LocalTime::from_ns(1'100), ReferenceTime::from_ns(1'000)),
+            Duration{100ns});
+  EXPECT_EQ(offset_from_reference(LocalTime::from_ns(900), ReferenceTime::from_ns(1'000)),
+            Duration{-100ns});
 }
 
 TEST(SyncSample, path_delay_is_added_to_the_origin) {

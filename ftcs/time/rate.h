@@ -10,14 +10,18 @@ namespace ftcs {
 
 /// The rate of one clock in units of another: dimensionless, exactly 1 when both run alike.
 ///
-/// Rates compose by multiplication (paper eq. 8, 13, 17); parts per billion exist only in the names of
-/// constructors and getters, because adding them is a first-order approximation.
+/// Rates compose by multiplication (paper eq. 8, 13, 17); parts per billion exist only in the names
+/// of constructors and getters, because adding them is a first-order approximation.
 class Rate {
  public:
   constexpr Rate() noexcept = default;
   [[nodiscard]] static constexpr Rate from_ratio(double ratio) noexcept { return Rate{ratio}; }
-  [[nodiscard]] static constexpr Rate from_ppb(double ppb) noexcept { return Rate{1.0 + ppb * 1e-9}; }
-  [[nodiscard]] static constexpr Rate from_ppm(double ppm) noexcept { return Rate{1.0 + ppm * 1e-6}; }
+  [[nodiscard]] static constexpr Rate from_ppb(double ppb) noexcept {
+    return Rate{1.0 + ppb * 1e-9};
+  }
+  [[nodiscard]] static constexpr Rate from_ppm(double ppm) noexcept {
+    return Rate{1.0 + ppm * 1e-6};
+  }
 
   [[nodiscard]] constexpr double ratio() const noexcept { return ratio_; }
   /// Fractional frequency deviation y = ratio - 1 (NIST SP 1065, 3.1).
@@ -36,13 +40,14 @@ class Rate {
   double ratio_ = 1.0;
 };
 
-/// elapsed * rate. The deviation alone is multiplied in floating point, so that the error is 2^-53 of the
-/// *correction*, not of the elapsed time.
+/// elapsed * rate. The deviation alone is multiplied in floating point, so that the error is 2^-53
+/// of the *correction*, not of the elapsed time.
 [[nodiscard]] constexpr Duration scale(Duration elapsed, Rate rate) noexcept {
   return elapsed + Duration::from_ns(elapsed.ns() * rate.deviation());
 }
 
-/// Slowest and fastest permitted rate: the paper's F, linuxptp's max_frequency. Neither zero nor negative.
+/// Slowest and fastest permitted rate: the paper's F, linuxptp's max_frequency. Neither zero nor
+/// negative.
 struct RateLimits {
   Rate slowest = Rate::from_ratio(0.5);
   Rate fastest = Rate::from_ratio(1.5);
@@ -68,7 +73,8 @@ struct RateLimits {
 
 /// The narrower of two limits.
 [[nodiscard]] constexpr RateLimits intersect(RateLimits a, RateLimits b) noexcept {
-  return {a.slowest > b.slowest ? a.slowest : b.slowest, a.fastest < b.fastest ? a.fastest : b.fastest};
+  return {a.slowest > b.slowest ? a.slowest : b.slowest,
+          a.fastest < b.fastest ? a.fastest : b.fastest};
 }
 
 }  // namespace ftcs

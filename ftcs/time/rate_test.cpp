@@ -27,7 +27,8 @@ TEST(RateLimits, clamp_never_lets_a_bad_rate_through) {
   EXPECT_EQ(limits.clamp(Rate::from_ppm(600.0)), limits.fastest);
   EXPECT_EQ(limits.clamp(Rate::from_ppm(-600.0)), limits.slowest);
   EXPECT_EQ(limits.clamp(Rate::from_ratio(std::numeric_limits<double>::quiet_NaN())), Rate{});
-  EXPECT_EQ(limits.clamp(Rate::from_ratio(std::numeric_limits<double>::infinity())), limits.fastest);
+  EXPECT_EQ(limits.clamp(Rate::from_ratio(std::numeric_limits<double>::infinity())),
+            limits.fastest);
   EXPECT_EQ(limits.clamp(Rate::from_ratio(-3.0)), limits.slowest);
   EXPECT_TRUE(limits.valid());
   EXPECT_FALSE(RateLimits::symmetric_ppb(1e9).valid());

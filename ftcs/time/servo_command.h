@@ -11,10 +11,11 @@ namespace ftcs {
 /// What a servo asks of a clock. Rates are local time per free-running time; a command replaces its
 /// predecessor entirely (never accumulates), so that a lost one is harmless.
 ///
-/// From the moment it is applied the clock runs at correction_rate for correction_time; then, without waiting
-/// for another sample, at tracking_rate. Paper eq. 17: correction (1 + p T_offset/T_c) k a, tracking k a.
-/// correction_time is a length of *reference* time (the paper's T_c); on the oscillator it lasts
-/// correction_time / tracking_rate. Zero means there is no correction: tracking_rate holds at once.
+/// From the moment it is applied the clock runs at correction_rate for correction_time; then,
+/// without waiting for another sample, at tracking_rate. Paper eq. 17: correction (1 + p
+/// T_offset/T_c) k a, tracking k a. correction_time is a length of *reference* time (the paper's
+/// T_c); on the oscillator it lasts correction_time / tracking_rate. Zero means there is no
+/// correction: tracking_rate holds at once.
 struct ServoCommand {
   Rate correction_rate;
   Duration correction_time{};

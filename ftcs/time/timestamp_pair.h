@@ -12,16 +12,17 @@ enum class Direction : std::uint8_t {
   kBackward,  ///< local to reference, as Delay_Req: local = t3, reference = t4 - correction
 };
 
-/// One timestamped message as a protocol sees it: reference stamp and stamp of the free-running oscillator.
-/// A protocol core emits these; it knows neither servo nor steered clock.
+/// One timestamped message as a protocol sees it: reference stamp and stamp of the free-running
+/// oscillator. A protocol core emits these; it knows neither servo nor steered clock.
 struct EventPair {
   Direction direction = Direction::kForward;
   ReferenceTime reference;
   FreeRunningTime free_running;
 };
 
-/// One timestamped message between the two clocks, as a servo sees it: the discipline has added what the
-/// steered clock showed at that instant. Frequency trackers read free_running, closed-loop laws read local.
+/// One timestamped message between the two clocks, as a servo sees it: the discipline has added
+/// what the steered clock showed at that instant. Frequency trackers read free_running, closed-loop
+/// laws read local.
 struct TimestampPair {
   Direction direction = Direction::kForward;
   ReferenceTime reference;
@@ -35,13 +36,14 @@ struct ClockReading {
   LocalTime local;
 };
 
-/// What a classic (offset-driven) control law is given: one forward message and the path delay to use with it.
-/// Origin and path delay stay apart, so that a change of the delay estimate does not look like frequency: k(n)
-/// (paper eq. 12) is formed from `origin` alone, both ends with one delay.
+/// What a classic (offset-driven) control law is given: one forward message and the path delay to
+/// use with it. Origin and path delay stay apart, so that a change of the delay estimate does not
+/// look like frequency: k(n) (paper eq. 12) is formed from `origin` alone, both ends with one
+/// delay.
 struct SyncSample {
-  ReferenceTime origin;     ///< t1 + correction
-  Duration path_delay;      ///< mean path delay d, eq. (2) corrected
-  LocalTime local;          ///< tau_l(n): t2 on the steered clock
+  ReferenceTime origin;          ///< t1 + correction
+  Duration path_delay;           ///< mean path delay d, eq. (2) corrected
+  LocalTime local;               ///< tau_l(n): t2 on the steered clock
   FreeRunningTime free_running;  ///< t2 on the free-running oscillator
 
   /// tau_rd(n) = tau_r(n) + d_rl(n).

@@ -1,0 +1,57 @@
+# make            build build/ftcs
+# make demo       install what is missing, build, watch a clock being locked
+# make test       install what is missing, build, test (at most 5 minutes after the build)
+# make test-all   everything, long runs too
+# make bench      nanoseconds and instructions per update, allocations
+# make check      formatting, linting, headers
+# make fuzz       each fuzz target for FUZZ_SECONDS
+# make mutate     flip signs and comparisons one at a time; every mutant must fail a test
+
+CMAKE_FLAGS ?=
+JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+DEMO_FLAGS ?=
+FUZZ_SECONDS ?= 60
+
+.PHONY: all configure build demo test test-all bench check tidy fuzz mutate deps deps-test clean
+
+all: build
+
+deps:
+	@tools/install-deps build
+deps-test:
+	@tools/install-deps build test
+
+configure: deps
+	@cmake --preset default $(CMAKE_FLAGS) > build-configure.log 2>&1 || { cat build-configure.log; exit 1; }
+	@mkdir -p build && mv build-configure.log build/configure.log
+
+build: configure
+	@cmake --build build -j $(JOBS) --target ftcs
+
+demo: build
+	@build/ftcs demo $(DEMO_FLAGS)
+
+test: deps-test configure
+	@cmake --build build -j $(JOBS)
+	@ctest --test-dir build -j $(JOBS) --output-on-failure -LE slow
+
+test-all: test
+	@ctest --test-dir build -j $(JOBS) --output-on-failure -L slow
+
+bench: deps-test
+	@cmake --preset release > /dev/null
+	@cmake --build build-release -j $(JOBS)
+	@build-release/bin/ftcs_bench
+	@bench/instructions.sh build-release
+
+check: deps-test configure
+	@tools/check
+
+fuzz: deps-test
+	@FUZZ_SECONDS=$(FUZZ_SECONDS) test/fuzz/run.sh
+
+mutate: deps-test
+	@tools/mutate.py
+
+clean:
+	@cmake -E rm -rf build build-release build-clang build-asan-ubsan build-tsan build-tidy build-fuzz
