@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/clock/virtual_clock.h"
+
+#include "ftcs/clock/command_check.h"
+
+namespace ftcs {
+
+VirtualClock::VirtualClock(FreeRunningSource& source, const VirtualClockConfig& config) noexcept
+    : source_(source),
+      limits_(intersect(config.limits, {Rate::from_ratio(FixedRate::kSlowest),
+                                        Rate::from_ratio(FixedRate::kFastest)})),
+      history_(SteeringHistory::Map{config.free_running, config.local, config.rate}) {}
+
+ClockReading VirtualClock::read() noexcept {
+  const FreeRunningTime now = source_.now();
+  return {now, local_at(now)};
+}
+
+LocalTime VirtualClock::local_at(FreeRunningTime instant) const noexcept {
+  return history_.local_at(instant);
+}
+
+Result<ClockReading, ClockError> VirtualClock::apply(const ServoCommand& command) noexcept {
+  return apply_at(source_.now(), command);
+}
+
+Result<ClockReading, ClockError> VirtualClock::apply_at(FreeRunningTime instant,
+                                                        const ServoCommand& command) noexcept {
+  if (const auto error = find_error(command, limits_)) return *error;
+  if (has_correction(command)) {
+    history_.steer(instant, command.correction_rate, command.step);
+    history_.steer(instant + correction_length(command), command.tracking_rate);
+  } else {
+    history_.steer(instant, command.tracking_rate, command.step);
+  }
+  return ClockReading{instant, local_at(instant)};
+}
+
+}  // namespace ftcs

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/time/duration.h"
+
+namespace ftcs {
+
+struct OutlierGateConfig {
+  double width = 6.0;  ///< accepted distance from the usual, in robust standard deviations; > 0
+  std::size_t warm_up = 8;  ///< innovations that are accepted unseen; at most OutlierGate::kMemory
+  std::size_t rejections_to_exit =
+      5;  ///< so many in a row are no outliers but the truth; at least 1
+  Nanoseconds resolution{
+      1};  ///< of the timestamps: no spread is smaller (all innovations may be equal)
+};
+
+enum class GateDecision : std::uint8_t {
+  kAccept,
+  kReject,
+  kExit,  ///< accepted, because too many were rejected in a row: whatever was predicted is wrong,
+          ///< start anew
+};
+
+struct GateCounters {
+  std::uint64_t accepted = 0;
+  std::uint64_t rejected = 0;
+  std::uint64_t exits = 0;
+};
+
+/// Tells outliers by the innovation (measured minus predicted), with a spread that it learns.
+///
+/// Usual value and spread are the median and 1.4826 MAD (the standard deviation of a normal
+/// distribution) of the last innovations, rejected ones included: a threshold learnt from accepted
+/// samples alone shuts itself. Copes with outliers in up to a quarter of the samples; follows a
+/// true step after rejections_to_exit samples. No threshold in nanoseconds is ever set.
+class OutlierGate {
+ public:
+  static constexpr std::size_t kMemory = 32;
+
+  explicit OutlierGate(const OutlierGateConfig& config = {}) noexcept : config_(config) {}
+
+  /// Decides on one innovation and learns from it.
+  [[nodiscard]] GateDecision decide(Duration innovation) noexcept;
+
+  [[nodiscard]] bool warm() const noexcept { return size_ >= config_.warm_up; }
+  /// Learnt standard deviation in nanoseconds; the resolution until something was learnt.
+  [[nodiscard]] double spread_ns() const noexcept;
+  [[nodiscard]] const GateCounters& counters() const noexcept { return counters_; }
+
+  /// Forgets the innovations, keeps the counters.
+  void reset() noexcept;
+
+ private:
+  using Values = std::array<double, kMemory>;
+
+  void learn(double innovation_ns) noexcept;
+  [[nodiscard]] double median_of(Values values) const noexcept;
+  [[nodiscard]] double spread_about(double centre) const noexcept;
+
+  OutlierGateConfig config_;
+  Values innovations_{};
+  std::size_t next_ = 0;
+  std::size_t size_ = 0;
+  std::size_t rejected_in_a_row_ = 0;
+  GateCounters counters_{};
+};
+
+}  // namespace ftcs

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/measurement/delay_filter.h"
+#include "ftcs/measurement/two_way_exchange.h"
+#include "ftcs/time/instant.h"
+#include "ftcs/time/rate.h"
+
+namespace ftcs {
+
+struct PathDelayConfig {
+  DelayFilterConfig filter{};
+  Nanoseconds asymmetry{};  ///< delayAsymmetry, IEEE 1588-2019, 7.4.2: positive when reference to
+                            ///< local is slower
+  bool rate_compensated = true;  ///< false: as linuxptp's, the turn-around is taken as measured
+  /// Below it a delay is impossible. Not zero: on a short link the noise of the stamps makes half
+  /// of the raw delays slightly negative, and a median of the other half would be biased.
+  Nanoseconds lowest{-1'000};
+  /// Above it a delay is absurd: 100 ms is 20,000 km of fibre.
+  Nanoseconds highest{100'000'000};
+};
+
+enum class PathDelayVerdict : std::uint8_t {
+  kUsed,       ///< the raw delay went into the filter
+  kDeferred,   ///< kept until the next forward message tells the rate
+  kNoPartner,  ///< no forward message near enough to form an exchange with
+  kNegative,   ///< raw delay below PathDelayConfig::lowest
+  kAbsurd,     ///< raw delay above PathDelayConfig::highest
+};
+
+struct PathDelayUpdate {
+  PathDelayVerdict verdict = PathDelayVerdict::kUsed;
+  Duration raw{};  ///< mean path delay of this exchange alone; zero unless computed
+};
+
+struct PathDelayCounters {
+  std::uint64_t used = 0;
+  std::uint64_t negative = 0;
+  std::uint64_t absurd = 0;
+  std::uint64_t without_partner = 0;
+  std::uint64_t restarts =
+      0;  ///< the forward messages did not continue: a jump of the reference, or time went backward
+};
+
+/// Path delay from forward and backward messages, entirely in free-running time: neither steering
+/// nor steps of the local clock disturb it. Valid from the first exchange on: the turn-around is
+/// converted to reference time by the rate ratio of the last forward messages (median of their
+/// pairwise slopes, Theil 1950: one delayed message in a few cannot tilt it). A backward message
+/// that comes before two forward ones is completed by the second one.
+class PathDelayEstimator {
+ public:
+  explicit PathDelayEstimator(const PathDelayConfig& config) noexcept
+      : config_(config), filter_(config.filter) {}
+
+  /// Sync: origin = t1 + corrections, received = t2. An exact repetition is ignored.
+  void on_forward(ReferenceTime origin, FreeRunningTime received) noexcept;
+  /// Delay_Req: sent = t3, received = t4 - corrections. May come late: its partner is the nearest
+  /// forward message.
+  PathDelayUpdate on_backward(FreeRunningTime sent, ReferenceTime received) noexcept;
+
+  [[nodiscard]] bool known() const noexcept { return !filter_.empty(); }
+  /// Delay from the reference to here: filtered mean path delay plus asymmetry. Zero until known.
+  [[nodiscard]] Duration path_delay() const noexcept {
+    return known() ? forward_delay(mean_path_delay(), config_.asymmetry) : Duration{};
+  }
+  /// Filtered mean path delay, as ptp4l prints it.
+  [[nodiscard]] Duration mean_path_delay() const noexcept { return filter_.value(); }
+  /// The last raw delay that was accepted.
+  [[nodiscard]] Duration latest() const noexcept { return latest_; }
+  [[nodiscard]] bool rate_known() const noexcept { return forward_count_ >= 2; }
+  /// Rate of the reference in units of the free-running oscillator; 1 until known.
+  [[nodiscard]] Rate rate_ratio() const noexcept;
+  [[nodiscard]] const PathDelayCounters& counters() const noexcept { return counters_; }
+
+  /// A new reference: forgets messages and delays, keeps the counters.
+  void reset() noexcept;
+
+ private:
+  struct Forward {
+    ReferenceTime origin;
+    FreeRunningTime received;
+  };
+  struct Backward {
+    FreeRunningTime sent;
+    ReferenceTime received;
+  };
+  /// Seven intervals of baseline: noise of the rate well below that of one interval, wander still
+  /// negligible.
+  static constexpr std::size_t kForwards = 8;
+
+  [[nodiscard]] const Forward& newest_forward() const noexcept {
+    return forwards_[(forward_next_ + kForwards - 1) % kForwards];
+  }
+  [[nodiscard]] const Forward& nearest_forward(FreeRunningTime sent) const noexcept;
+  [[nodiscard]] bool continues(const Forward& next) const noexcept;
+  PathDelayUpdate complete(const Backward& backward) noexcept;
+
+  PathDelayConfig config_;
+  DelayFilter filter_;
+  std::array<Forward, kForwards> forwards_{};
+  std::size_t forward_next_ = 0;
+  std::size_t forward_count_ = 0;
+  bool has_deferred_ = false;
+  Backward deferred_{};
+  Duration latest_{};
+  PathDelayCounters counters_{};
+};
+
+}  // namespace ftcs
