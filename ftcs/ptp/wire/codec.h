@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "ftcs/ptp/wire/message.h"
+#include "ftcs/time/result.h"
+
+namespace ftcs::ptp {
+
+/// Why bytes are no PTP message that we understand.
+enum class DecodeReason : std::uint8_t {
+  kTruncated,     ///< fewer bytes than the header, the fixed part or messageLength needs
+  kOversized,     ///< more bytes than an Ethernet frame can carry
+  kWrongVersion,  ///< versionPTP is not 2
+  kUnknownType,   ///< a messageType that 13.3.2.3 reserves
+  kWrongLength,   ///< messageLength is smaller than the fixed part of its type
+  kBadTimestamp,  ///< nanoseconds of 10^9 or more (5.3.3), or seconds beyond 64-bit nanoseconds
+                  ///< (year 2262)
+  kMalformedTlv,  ///< a TLV of odd length, or one that ends behind the message (14.1)
+};
+inline constexpr std::size_t kDecodeReasons = 7;
+
+[[nodiscard]] std::string_view to_string(DecodeReason reason) noexcept;
+
+/// What was expected at which octet, and what stood there.
+struct DecodeError {
+  DecodeReason reason = DecodeReason::kTruncated;
+  std::uint64_t expected = 0;
+  std::uint64_t received = 0;
+  std::size_t offset = 0;
+};
+
+/// UDP payload of a full Ethernet frame: 1500 - 20 (IPv4) - 8 (UDP). No message we understand is
+/// longer.
+inline constexpr std::size_t kMaximumMessageSize = 1472;
+
+/// Bytes to message. Octets behind messageLength are padding and ignored (Annexes C to E); TLVs
+/// inside are checked and skipped (14.1). The result never refers to the bytes.
+[[nodiscard]] Result<Message, DecodeError> decode(std::span<const std::uint8_t> bytes) noexcept;
+
+/// An encoded message; Announce, the longest one without TLVs, fits.
+struct MessageBytes {
+  std::array<std::uint8_t, 64> octets{};
+  std::uint8_t size = 0;
+  [[nodiscard]] constexpr std::span<const std::uint8_t> view() const noexcept {
+    return {octets.data(), size};
+  }
+};
+
+enum class EncodeError : std::uint8_t {
+  kTimestampOutOfRange,   ///< before the epoch: seconds are unsigned on the wire
+  kCorrectionOutOfRange,  ///< beyond ±2^47 ns
+};
+
+/// Message to bytes. A timestamp's fraction of a nanosecond is cut off: put it into the correction
+/// first.
+[[nodiscard]] Result<MessageBytes, EncodeError> encode(const Message& message) noexcept;
+
+}  // namespace ftcs::ptp
