@@ -20,11 +20,7 @@ void PathDelayEstimator::on_forward(ReferenceTime origin, FreeRunningTime receiv
   const Forward next{origin, received};
   if (forward_count_ > 0) {
     if (received == newest_forward().received) return;
-    if (!continues(next)) {
-      forward_count_ = 0;
-      has_deferred_ = false;
-      ++counters_.restarts;
-    }
+    if (!continues(next)) restart();
   }
   forwards_[forward_next_] = next;
   forward_next_ = (forward_next_ + 1) % kForwards;
@@ -100,6 +96,12 @@ const PathDelayEstimator::Forward& PathDelayEstimator::nearest_forward(
   return *std::min_element(
       forwards_.begin(), forwards_.begin() + static_cast<std::ptrdiff_t>(forward_count_),
       [&distance](const Forward& a, const Forward& b) { return distance(a) < distance(b); });
+}
+
+void PathDelayEstimator::restart() noexcept {
+  forward_next_ = forward_count_ = 0;
+  has_deferred_ = false;
+  ++counters_.restarts;
 }
 
 void PathDelayEstimator::reset() noexcept {

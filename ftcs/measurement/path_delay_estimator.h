@@ -76,6 +76,9 @@ class PathDelayEstimator {
   [[nodiscard]] Rate rate_ratio() const noexcept;
   [[nodiscard]] const PathDelayCounters& counters() const noexcept { return counters_; }
 
+  /// The next forward message does not continue the last ones: forgets messages and rate, keeps the
+  /// delays.
+  void restart() noexcept;
   /// A new reference: forgets messages and delays, keeps the counters.
   void reset() noexcept;
 

@@ -31,6 +31,7 @@ enum class SampleVerdict : std::uint8_t {
 struct ServoSnapshot {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   ServoState state = ServoState::kUnlocked;
+  bool offset_known = false;  ///< a path delay and a sample are there: offset means something
   Duration offset{};      ///< latest offset, local minus reference: perceived by classic servos,
                           ///< filtered by others
   Duration path_delay{};  ///< latest mean path delay

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/discipline/clock_discipline.h"
+
+namespace ftcs {
+namespace {
+
+ServoConfig limited(ServoConfig config, const RateLimits& limits) noexcept {
+  config.limits = limits;
+  return config;
+}
+
+}  // namespace
+
+ClockDiscipline::ClockDiscipline(const DisciplineConfig& config, AdjustableClock& clock) noexcept
+    : config_(config),
+      clock_(clock),
+      limits_(intersect(config.servo.limits, clock.rate_limits())),
+      servo_(make_servo(limited(config.servo, limits_))),
+      lock_(config.lock),
+      sync_interval_(config.servo.sync_interval) {}
+
+Telemetry ClockDiscipline::on_pair(const EventPair& event) noexcept {
+  const ClockReading now = clock_.read();
+  begin(now);
+  const TimestampPair pair{event.direction, event.reference, clock_.local_at(event.free_running),
+                           event.free_running};
+  const ServoUpdate update = servo_.update(pair, now);
+  telemetry_.direction = event.direction;
+  telemetry_.verdict = update.verdict;
+  telemetry_.servo = servo_.snapshot();
+  count(event.direction, update.verdict);
+  if (update.verdict == SampleVerdict::kUsed && event.direction == Direction::kForward) {
+    note_sample(event);
+    if (telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
+  }
+  check_silence(now);
+  if (update.has_command) steer(update.command, telemetry_.servo.offset);
+  return finish();
+}
+
+Telemetry ClockDiscipline::on_silence() noexcept {
+  const ClockReading now = clock_.read();
+  begin(now);
+  check_silence(now);
+  return finish();
+}
+
+void ClockDiscipline::on_new_reference() noexcept {
+  servo_.reset();
+  lock_.reset();
+  has_sample_ = false;
+  in_holdover_ = false;
+  ++counters_.new_references;
+  telemetry_.servo = servo_.snapshot();
+  finish();
+}
+
+void ClockDiscipline::begin(const ClockReading& reading) noexcept {
+  telemetry_.reading = reading;
+  telemetry_.commanded = false;
+  telemetry_.step = Duration{};
+  telemetry_.offset_refused = false;
+  telemetry_.error.reset();
+}
+
+const Telemetry& ClockDiscipline::finish() noexcept {
+  telemetry_.locked = locked();
+  if (in_holdover_) telemetry_.servo.state = ServoState::kHoldover;
+  return telemetry_;
+}
+
+void ClockDiscipline::count(Direction direction, SampleVerdict verdict) noexcept {
+  switch (verdict) {
+    case SampleVerdict::kUsed:
+      ++(direction == Direction::kForward ? counters_.used : counters_.backward);
+      break;
+    case SampleVerdict::kRejected:
+      ++counters_.rejected;
+      break;
+    case SampleVerdict::kDuplicate:
+      ++counters_.duplicate;
+      break;
+    case SampleVerdict::kImplausible:
+      ++counters_.implausible;
+      break;
+  }
+}
+
+void ClockDiscipline::note_sample(const EventPair& pair) noexcept {
+  if (has_sample_ && config_.servo.sync_interval == Nanoseconds{0}) {
+    sync_interval_ = pair.reference - last_sample_.reference;
+  }
+  last_sample_ = pair;
+  has_sample_ = true;
+  in_holdover_ = false;
+}
+
+void ClockDiscipline::check_silence(const ClockReading& reading) noexcept {
+  if (!has_sample_ || in_holdover_ || sync_interval_ <= Duration{}) return;
+  const double silence_ns = (reading.free_running - last_sample_.free_running).ns();
+  if (silence_ns <= sync_interval_.ns() * config_.missed_intervals_to_holdover) return;
+  in_holdover_ = true;
+  ++counters_.holdovers;
+}
+
+void ClockDiscipline::steer(const ServoCommand& wanted, Duration offset) noexcept {
+  if (refuses(offset)) {
+    telemetry_.offset_refused = true;
+    ++counters_.refused;
+    return;
+  }
+  const ServoCommand command = within_limits(with_step(wanted, offset));
+  const Result<ClockReading, ClockError> applied = clock_.apply(command);
+  if (!applied) {
+    telemetry_.error = applied.error();
+    ++counters_.apply_errors;
+    return;
+  }
+  first_command_ = false;
+  ++counters_.commands;
+  if (at_limit(command)) ++counters_.clamps;
+  if (command.step != Duration{}) {
+    ++counters_.steps;
+    if (wanted.step == Duration{}) servo_.on_step(command.step);
+  }
+  telemetry_.commanded = true;
+  telemetry_.step = command.step;
+  telemetry_.applied_rate = command.correction_rate;
+  telemetry_.tracking_rate = command.tracking_rate;
+}
+
+bool ClockDiscipline::refuses(Duration offset) const noexcept {
+  return first_command_ && config_.largest_first_offset > Nanoseconds{0} &&
+         !config_.step.permits(first_command_) &&
+         abs(offset) > Duration{config_.largest_first_offset};
+}
+
+ServoCommand ClockDiscipline::with_step(ServoCommand command, Duration offset) const noexcept {
+  if (!config_.step.permits(first_command_)) {
+    command.step = Duration{};
+    return command;
+  }
+  // linuxptp-pi has thresholds of its own, and its start-up depends on them.
+  const bool servo_decides = config_.servo.kind == ServoKind::kLinuxptpPi;
+  if (servo_decides || abs(offset) <= Duration{config_.step.threshold}) return command;
+  return {command.tracking_rate, Duration{}, command.tracking_rate, -offset};
+}
+
+ServoCommand ClockDiscipline::within_limits(ServoCommand command) const noexcept {
+  command.tracking_rate = limits_.clamp(command.tracking_rate);
+  command.correction_rate = command.correction_time > Duration{}
+                                ? limits_.clamp(command.correction_rate)
+                                : command.tracking_rate;
+  return command;
+}
+
+bool ClockDiscipline::at_limit(const ServoCommand& command) const noexcept {
+  const auto at_edge = [this](Rate rate) {
+    return rate == limits_.slowest || rate == limits_.fastest;
+  };
+  return at_edge(command.correction_rate) || at_edge(command.tracking_rate);
+}
+
+}  // namespace ftcs

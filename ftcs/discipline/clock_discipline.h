@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/discipline/lock_detector.h"
+#include "ftcs/discipline/step_policy.h"
+#include "ftcs/discipline/telemetry.h"
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs {
+
+struct DisciplineConfig {
+  ServoConfig servo{};  ///< its limits are narrowed by the clock's own
+  StepPolicy step{};
+  LockConfig lock{};
+  /// A larger first offset is not steered but refused, message by message: a slew over seconds is a
+  /// mistake of the set-up. Zero: no bound. Not asked where the policy permits a step.
+  Nanoseconds largest_first_offset{0};
+  /// Sync intervals without a usable sample before holdover: more than one or two lost messages.
+  std::uint32_t missed_intervals_to_holdover = 4;
+};
+
+/// The one place where a servo meets a clock.
+///
+/// Completes each message with what the steered clock showed, asks the servo, applies step policy
+/// and limits, and hands the command to the clock. The clock itself ends a correction after T_c
+/// (AdjustableClock), so that a lost message does no harm. Counts and reports; decides nothing
+/// about frequency or offset.
+class ClockDiscipline {
+ public:
+  /// The clock must outlive the discipline. Valid: validate(config.servo) finds nothing.
+  ClockDiscipline(const DisciplineConfig& config, AdjustableClock& clock) noexcept;
+
+  Telemetry on_pair(const EventPair& pair) noexcept;
+  /// To be called when nothing has come for a while, as often as liked: samples missing for
+  /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking rate.
+  Telemetry on_silence() noexcept;
+  /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
+  void on_new_reference() noexcept;
+
+  [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
+  [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] bool locked() const noexcept { return lock_.locked() && !in_holdover_; }
+
+ private:
+  void begin(const ClockReading& reading) noexcept;
+  void count(Direction direction, SampleVerdict verdict) noexcept;
+  void note_sample(const EventPair& pair) noexcept;
+  void check_silence(const ClockReading& reading) noexcept;
+  void steer(const ServoCommand& wanted, Duration offset) noexcept;
+  [[nodiscard]] ServoCommand with_step(ServoCommand command, Duration offset) const noexcept;
+  [[nodiscard]] ServoCommand within_limits(ServoCommand command) const noexcept;
+  [[nodiscard]] bool at_limit(const ServoCommand& command) const noexcept;
+  [[nodiscard]] bool refuses(Duration offset) const noexcept;
+  const Telemetry& finish() noexcept;
+
+  DisciplineConfig config_;
+  AdjustableClock& clock_;
+  RateLimits limits_;
+  AnyServo servo_;
+  LockDetector lock_;
+  bool first_command_ = true;
+  bool in_holdover_ = false;
+  bool has_sample_ = false;
+  EventPair last_sample_{};
+  Duration sync_interval_{};  ///< configured, or between the last two samples
+  Telemetry telemetry_{};
+  DisciplineCounters counters_{};
+};
+
+}  // namespace ftcs

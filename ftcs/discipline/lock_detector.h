@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/servo/converged_band.h"
+
+namespace ftcs {
+
+struct LockConfig {
+  /// Locked below `enter`, lost at or above `leave`.
+  ConvergedBand band{Nanoseconds{10'000}, Nanoseconds{100'000}};
+  /// Consecutive samples below `enter` before the clock counts as locked: one may be chance.
+  std::uint32_t dwell = 4;
+};
+
+/// Tells health, not control: nothing steers by it. Judges the perceived offset.
+class LockDetector {
+ public:
+  explicit LockDetector(const LockConfig& config = {}) noexcept : config_(config) {}
+
+  bool update(Duration offset) noexcept {
+    return latch_.update(offset, config_.band, config_.dwell);
+  }
+  [[nodiscard]] bool locked() const noexcept { return latch_.closed(); }
+  void reset() noexcept { latch_ = ConvergenceLatch{}; }
+
+ private:
+  LockConfig config_;
+  ConvergenceLatch latch_{};
+};
+
+}  // namespace ftcs

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/servo/servo.h"
+
+namespace ftcs {
+
+/// Counted since construction; a new reference does not clear them.
+struct DisciplineCounters {
+  std::uint64_t used = 0;         ///< forward messages that reached the control law
+  std::uint64_t backward = 0;     ///< backward messages that were plausible
+  std::uint64_t rejected = 0;     ///< outliers
+  std::uint64_t duplicate = 0;    ///< repeated or late
+  std::uint64_t implausible = 0;  ///< time went backward, absurd delay or interval
+  std::uint64_t commands = 0;     ///< taken by the clock
+  std::uint64_t steps = 0;
+  std::uint64_t clamps = 0;   ///< commands that run at a limit
+  std::uint64_t refused = 0;  ///< first offsets beyond largest_first_offset: not acted on
+  std::uint64_t apply_errors = 0;
+  std::uint64_t holdovers = 0;
+  std::uint64_t new_references = 0;
+};
+
+/// What one message (or its absence) came to: small, plain, copied by the one thread that owns the
+/// discipline.
+struct Telemetry {
+  Direction direction = Direction::kForward;
+  SampleVerdict verdict = SampleVerdict::kUsed;
+  ServoSnapshot servo{};   ///< servo.state is kHoldover while samples are missing
+  ClockReading reading{};  ///< of the steered clock, when the message was handled
+  Rate applied_rate{};     ///< correction rate of the command in force (its tracking rate if it has
+                           ///< none)
+  Rate tracking_rate{};    ///< what the clock runs at once the correction has expired
+  bool commanded = false;  ///< this message made a command, and the clock took it
+  Duration step{};         ///< that came with it
+  bool offset_refused = false;        ///< the first offset exceeds largest_first_offset
+  bool locked = false;                ///< LockDetector
+  std::optional<ClockError> error{};  ///< the clock refused the command
+};
+
+}  // namespace ftcs

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs {
+namespace {
+
+/// The law's own configuration with the common settings filled in.
+template <class LawConfig>
+LawConfig with_common(LawConfig law, const ServoConfig& common) noexcept {
+  if (common.sync_interval != Nanoseconds{0}) law.sync_interval = common.sync_interval;
+  law.limits = intersect(law.limits, common.limits);
+  return law;
+}
+
+}  // namespace
+
+std::string_view servo_kind_name(ServoKind kind) noexcept {
+  for (const ServoKindName& entry : kServoKinds) {
+    if (entry.kind == kind) return entry.name;
+  }
+  return "unknown";
+}
+
+std::optional<ServoKind> servo_kind_from_name(std::string_view name) noexcept {
+  for (const ServoKindName& entry : kServoKinds) {
+    if (entry.name == name) return entry.kind;
+  }
+  return std::nullopt;
+}
+
+std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
+  if (!config.limits.valid()) return ServoConfigError::kRateLimits;
+  switch (config.kind) {
+    case ServoKind::kFtcs:
+      return validate(with_common(config.ftcs, config));
+    case ServoKind::kPics:
+      return validate(with_common(config.pics, config));
+    case ServoKind::kLinuxptpPi:
+      return validate(with_common(config.linuxptp_pi, config));
+    case ServoKind::kFreeRunning:
+      return validate(config.free_running);
+  }
+  return std::nullopt;
+}
+
+AnyServo make_servo(const ServoConfig& config) noexcept {
+  const TwoWayConfig& two_way = config.two_way;
+  switch (config.kind) {
+    case ServoKind::kFtcs:
+      return AnyServo{TwoWayServo<FtcsServo>{two_way, with_common(config.ftcs, config)}};
+    case ServoKind::kPics:
+      return AnyServo{TwoWayServo<PicsServo>{two_way, with_common(config.pics, config)}};
+    case ServoKind::kLinuxptpPi:
+      return AnyServo{
+          TwoWayServo<LinuxptpPiServo>{two_way, with_common(config.linuxptp_pi, config)}};
+    case ServoKind::kFreeRunning:
+      break;
+  }
+  return AnyServo{TwoWayServo<FreeRunningServo>{two_way, config.free_running}};
+}
+
+ServoUpdate AnyServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
+  return std::visit([&](auto& servo) noexcept { return servo.update(pair, now); }, servo_);
+}
+
+void AnyServo::reset() noexcept {
+  std::visit([](auto& servo) noexcept { servo.reset(); }, servo_);
+}
+
+void AnyServo::on_step(Duration step) noexcept {
+  std::visit(
+      [step](auto& servo) noexcept {
+        if constexpr (requires { servo.on_step(step); }) servo.on_step(step);
+      },
+      servo_);
+}
+
+ServoSnapshot AnyServo::snapshot() const noexcept {
+  return std::visit([](const auto& servo) noexcept { return servo.snapshot(); }, servo_);
+}
+
+}  // namespace ftcs

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "ftcs/servo/free_running_servo.h"
+#include "ftcs/servo/ftcs_servo.h"
+#include "ftcs/servo/linuxptp_pi_servo.h"
+#include "ftcs/servo/pics_servo.h"
+#include "ftcs/servo/servo.h"
+#include "ftcs/servo/servo_config_error.h"
+#include "ftcs/servo/two_way_servo.h"
+
+namespace ftcs {
+
+// A further servo needs one line in each of: ServoKind, kServoKinds, ServoConfig, AnyServo::Variant
+// and, in any_servo.cpp, make_servo and validate.
+
+enum class ServoKind : std::uint8_t { kFtcs, kPics, kLinuxptpPi, kFreeRunning };
+
+struct ServoKindName {
+  ServoKind kind;
+  std::string_view name;
+};
+
+/// Every servo with the name it has on the command line and in files.
+inline constexpr ServoKindName kServoKinds[] = {
+    {ServoKind::kFtcs, "ftcs"},
+    {ServoKind::kPics, "pics"},
+    {ServoKind::kLinuxptpPi, "linuxptp-pi"},
+    {ServoKind::kFreeRunning, "none"},
+};
+
+[[nodiscard]] std::string_view servo_kind_name(ServoKind kind) noexcept;
+[[nodiscard]] std::optional<ServoKind> servo_kind_from_name(std::string_view name) noexcept;
+
+/// Everything that can be set about any servo. sync_interval and limits are common: make_servo()
+/// hands them to the law that is chosen (the interval unless it is zero; the limits narrowed by the
+/// law's own).
+struct ServoConfig {
+  ServoKind kind = ServoKind::kFtcs;
+  Nanoseconds sync_interval{0};
+  RateLimits limits{};
+  TwoWayConfig two_way{};
+  FtcsConfig ftcs{};
+  PicsConfig pics{};
+  LinuxptpPiConfig linuxptp_pi{};
+  FreeRunningConfig free_running{};
+};
+
+/// Of the chosen kind only.
+[[nodiscard]] std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept;
+
+/// Any servo as one value, chosen at run time: a closed set, so no virtual functions and no heap.
+class AnyServo {
+ public:
+  using Variant = std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>,
+                               TwoWayServo<LinuxptpPiServo>, TwoWayServo<FreeRunningServo>>;
+
+  explicit AnyServo(const Variant& servo) noexcept : servo_(servo) {}
+
+  ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
+  void reset() noexcept;
+  /// The clock has been stepped by somebody else; a servo that lives in free-running time need not
+  /// know.
+  void on_step(Duration step) noexcept;
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept;
+
+ private:
+  Variant servo_;
+};
+
+static_assert(ClockServo<AnyServo>);
+
+/// The servo that `config` asks for. Valid: validate(config) finds nothing.
+[[nodiscard]] AnyServo make_servo(const ServoConfig& config) noexcept;
+
+}  // namespace ftcs

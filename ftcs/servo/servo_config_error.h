@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace ftcs {
+
+/// Why a servo's configuration cannot work.
+enum class ServoConfigError : std::uint8_t {
+  kSyncInterval,
+  kCorrectionTime,
+  kOffsetGain,
+  kConvergedBand,
+  kRateLimits,
+  kPlausibleRatio,
+  kProportionalGain,
+  kIntegralGain,
+  kStepThreshold,
+};
+
+/// One sentence: what was expected.
+[[nodiscard]] constexpr std::string_view describe(ServoConfigError error) noexcept {
+  switch (error) {
+    case ServoConfigError::kSyncInterval:
+      return "the sync interval must not be negative";
+    case ServoConfigError::kCorrectionTime:
+      return "the correction time must lie between 0 and the sync interval";
+    case ServoConfigError::kOffsetGain:
+      return "the offset gain must lie between 0 and 1";
+    case ServoConfigError::kConvergedBand:
+      return "the converged band needs 0 <= enter <= leave";
+    case ServoConfigError::kRateLimits:
+      return "the rate limits need 0 < slowest <= 1 <= fastest";
+    case ServoConfigError::kPlausibleRatio:
+      return "the plausible rate ratios need 0 < slowest <= 1 <= fastest";
+    case ServoConfigError::kProportionalGain:
+      return "the proportional gain must be finite and not negative";
+    case ServoConfigError::kIntegralGain:
+      return "the integral gain must be finite and not negative";
+    case ServoConfigError::kStepThreshold:
+      return "a step threshold must not be negative";
+  }
+  return "unknown configuration error";
+}
+
+}  // namespace ftcs

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include "ftcs/measurement/outlier_gate.h"
+#include "ftcs/measurement/path_delay_estimator.h"
+#include "ftcs/servo/servo.h"
+
+namespace ftcs {
+
+/// What every classic servo needs in front of its control law.
+struct TwoWayConfig {
+  PathDelayConfig path_delay{};
+  /// A path delay known otherwise (peer delay, wiring): backward messages are then not used. May be
+  /// set to zero.
+  std::optional<Nanoseconds> fixed_path_delay{};
+  bool gate_enabled = true;
+  OutlierGateConfig gate{};
+};
+
+/// A ClockServo made of a control law: path-delay estimator and outlier gate in front of it.
+///
+/// The gate judges a forward message against the prediction in free-running time (last accepted
+/// message plus elapsed time times rate ratio), not the control error: steering cannot look like an
+/// outlier. A rejected message reaches neither the law nor the path delay. When the gate gives way,
+/// the law starts anew, while the clock keeps its last command.
+template <ControlLaw Law>
+class TwoWayServo {
+ public:
+  TwoWayServo(const TwoWayConfig& config, const typename Law::Config& law) noexcept
+      : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
+
+  ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept {
+    return pair.direction == Direction::kForward ? on_forward(pair, now) : on_backward(pair);
+  }
+
+  void reset() noexcept {
+    delay_.reset();
+    gate_.reset();
+    law_.reset();
+    has_latest_ = has_accepted_ = law_fed_ = false;
+  }
+
+  /// The clock has been stepped by somebody else.
+  void on_step(Duration step) noexcept {
+    if constexpr (requires { law_.on_step(step); }) law_.on_step(step);
+  }
+
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept {
+    ServoSnapshot snapshot = law_.snapshot();
+    snapshot.offset_known = law_fed_;
+    snapshot.path_delay = path_delay();
+    return snapshot;
+  }
+
+ private:
+  [[nodiscard]] bool path_delay_known() const noexcept {
+    return config_.fixed_path_delay.has_value() || delay_.known();
+  }
+  [[nodiscard]] Duration path_delay() const noexcept {
+    return config_.fixed_path_delay.has_value() ? Duration{*config_.fixed_path_delay}
+                                                : delay_.path_delay();
+  }
+  [[nodiscard]] SyncSample sample_of(const TimestampPair& pair) const noexcept {
+    return {pair.reference, path_delay(), pair.local, pair.free_running};
+  }
+  [[nodiscard]] static bool newer(const TimestampPair& pair, const TimestampPair& than) noexcept {
+    return pair.reference - than.reference > Duration{} ||
+           pair.free_running - than.free_running > Duration{};
+  }
+
+  [[nodiscard]] GateDecision judge(const TimestampPair& pair) noexcept {
+    if (!config_.gate_enabled || !has_accepted_ || !delay_.rate_known()) {
+      return GateDecision::kAccept;
+    }
+    const ReferenceTime predicted =
+        accepted_.reference +
+        scale(pair.free_running - accepted_.free_running, delay_.rate_ratio());
+    return gate_.decide(predicted - pair.reference);  // positive: arrived late
+  }
+
+  ServoUpdate on_forward(const TimestampPair& pair, const ClockReading& now) noexcept {
+    if (has_latest_ && !newer(pair, latest_)) return {SampleVerdict::kDuplicate, false, {}};
+    latest_ = pair;
+    has_latest_ = true;
+    const GateDecision decision = judge(pair);
+    if (decision == GateDecision::kReject) return {SampleVerdict::kRejected, false, {}};
+    if (decision == GateDecision::kExit) {
+      law_.reset();
+      delay_.restart();
+      has_accepted_ = false;
+    }
+    const TimestampPair previous = accepted_;
+    const bool has_previous = has_accepted_;
+    accepted_ = pair;
+    has_accepted_ = true;
+    const bool was_known = path_delay_known();
+    delay_.on_forward(pair.reference, pair.free_running);
+    if (!path_delay_known()) return {};
+    if constexpr (requires { law_.prime(sample_of(previous)); }) {
+      if (!was_known && has_previous) law_.prime(sample_of(previous));
+    }
+    law_fed_ = true;
+    return law_.update(sample_of(pair), now);
+  }
+
+  ServoUpdate on_backward(const TimestampPair& pair) noexcept {
+    if (config_.fixed_path_delay.has_value()) return {};
+    const PathDelayUpdate update = delay_.on_backward(pair.free_running, pair.reference);
+    const bool possible = update.verdict != PathDelayVerdict::kNegative &&
+                          update.verdict != PathDelayVerdict::kAbsurd;
+    return {possible ? SampleVerdict::kUsed : SampleVerdict::kImplausible, false, {}};
+  }
+
+  TwoWayConfig config_;
+  PathDelayEstimator delay_;
+  OutlierGate gate_;
+  Law law_;
+  bool has_latest_ = false;
+  bool has_accepted_ = false;
+  bool law_fed_ = false;
+  TimestampPair latest_{};    ///< newest forward message, used or not
+  TimestampPair accepted_{};  ///< newest forward message that was not rejected
+};
+
+}  // namespace ftcs
