@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "ftcs/time/instant.h"
@@ -9,33 +8,27 @@
 
 namespace ftcs {
 
-/// A rate that can be multiplied without rounding: round(ratio * 2^53), 0 < ratio < 2^10.
+/// A rate that can be multiplied without rounding: floor(ratio * 2^53), 0 < ratio < 2^10.
 ///
 /// A double between 1/2 and 2 has no digit below 2^-53, so that every rate a clock meets in
-/// practice is held exactly. Anything outside the range, not-a-number included, is pulled to its
-/// nearer end (fastest for not-a-number).
+/// practice is held exactly; a slower one is cut off there. Anything outside kLimits is pulled to
+/// the nearer end, not-a-number to 1.
 class FixedRate {
  public:
   static constexpr int kFractionBits = 53;
-  static constexpr double kUnit = 9007199254740992.0;  // 2^53
-  static constexpr double kSlowest = 1.0 / 1024.0;
-  static constexpr double kFastest = 1023.0;
+  static constexpr RateLimits kLimits{Rate::from_ratio(1.0 / 1024.0), Rate::from_ratio(1023.0)};
 
   constexpr FixedRate() noexcept = default;
-  explicit FixedRate(Rate rate) noexcept
-      : scaled_(static_cast<std::uint64_t>(std::llround(in_range(rate.ratio()) * kUnit))) {}
+  constexpr explicit FixedRate(Rate rate) noexcept
+      : scaled_(static_cast<std::uint64_t>(kLimits.clamp(rate).ratio() * kUnit)) {}
 
   [[nodiscard]] constexpr std::uint64_t scaled() const noexcept { return scaled_; }
   [[nodiscard]] constexpr Rate rate() const noexcept {
     return Rate::from_ratio(static_cast<double>(scaled_) / kUnit);
   }
-  friend constexpr bool operator==(FixedRate, FixedRate) noexcept = default;
 
  private:
-  [[nodiscard]] static constexpr double in_range(double ratio) noexcept {
-    if (!(ratio < kFastest)) return kFastest;
-    return ratio < kSlowest ? kSlowest : ratio;
-  }
+  static constexpr double kUnit = 9007199254740992.0;  // 2^53
 
   std::uint64_t scaled_ = std::uint64_t{1} << kFractionBits;
 };

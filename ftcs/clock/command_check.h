@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/clock/affine_map.h"
 #include "ftcs/time/servo_command.h"
 
 namespace ftcs {
@@ -16,8 +17,9 @@ namespace ftcs {
 
 /// How long the correction lasts on the free-running oscillator: T_c is reference time, and the
 /// tracking rate is reference per free running.
-[[nodiscard]] constexpr Duration correction_length(const ServoCommand& command) noexcept {
-  return scale(command.correction_time, command.tracking_rate.inverse());
+[[nodiscard]] inline Duration correction_length(const ServoCommand& command) noexcept {
+  const AffineMap<FreeRunningTime, ReferenceTime> reference{{}, {}, command.tracking_rate};
+  return reference.inverse(ReferenceTime{command.correction_time}).since_epoch();
 }
 
 /// Why a clock with these limits must refuse the command. A correction rate that will not be used

@@ -7,9 +7,9 @@ namespace ftcs {
 
 VirtualClock::VirtualClock(FreeRunningSource& source, const VirtualClockConfig& config) noexcept
     : source_(source),
-      limits_(intersect(config.limits, {Rate::from_ratio(FixedRate::kSlowest),
-                                        Rate::from_ratio(FixedRate::kFastest)})),
-      history_(SteeringHistory::Map{config.free_running, config.local, config.rate}) {}
+      limits_(intersect(config.limits, FixedRate::kLimits)),
+      history_(
+          SteeringHistory::Map{config.free_running, config.local, limits_.clamp(config.rate)}) {}
 
 ClockReading VirtualClock::read() noexcept {
   const FreeRunningTime now = source_.now();
