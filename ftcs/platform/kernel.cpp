@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/kernel.h"
+
+#include <cerrno>
+#include <fcntl.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace ftcs::platform {
+namespace {
+
+constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+
+template <class Number>
+Number or_errno(Number result) noexcept {
+  return result < 0 ? static_cast<Number>(-errno) : result;
+}
+
+}  // namespace
+
+std::int64_t LinuxKernel::clock_ns(clockid_t clock) noexcept {
+  timespec time{};
+  if (::clock_gettime(clock, &time) != 0) return 0;
+  return std::int64_t{time.tv_sec} * kNanosecondsPerSecond + time.tv_nsec;
+}
+
+int LinuxKernel::socket(int domain, int type) noexcept {
+  return or_errno(::socket(domain, type, 0));
+}
+
+int LinuxKernel::bind(int fd, const sockaddr_in& address) noexcept {
+  return or_errno(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address));
+}
+
+int LinuxKernel::set_option(int fd, int level, int name, const void* value,
+                            socklen_t size) noexcept {
+  return or_errno(::setsockopt(fd, level, name, value, size));
+}
+
+int LinuxKernel::set_nonblocking(int fd) noexcept {
+  const int flags = or_errno(::fcntl(fd, F_GETFL, 0));
+  return flags < 0 ? flags : or_errno(::fcntl(fd, F_SETFL, flags | O_NONBLOCK));
+}
+
+ssize_t LinuxKernel::send_to(int fd, std::span<const std::uint8_t> bytes,
+                             const sockaddr_in& to) noexcept {
+  return or_errno(::sendto(fd, bytes.data(), bytes.size(), 0,
+                           reinterpret_cast<const sockaddr*>(&to), sizeof to));
+}
+
+ssize_t LinuxKernel::receive(int fd, msghdr& message, int flags) noexcept {
+  return or_errno(::recvmsg(fd, &message, flags));
+}
+
+int LinuxKernel::control(int fd, unsigned long request, void* argument) noexcept {
+  return or_errno(::ioctl(fd, request, argument));
+}
+
+int LinuxKernel::open(const char* path, int flags) noexcept {
+  return or_errno(::open(path, flags));
+}
+
+int LinuxKernel::poll(std::span<pollfd> descriptors, int timeout_ms) noexcept {
+  return or_errno(::poll(descriptors.data(), descriptors.size(), timeout_ms));
+}
+
+void LinuxKernel::close(int fd) noexcept { ::close(fd); }
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  if (this != &other) {
+    reset();
+    kernel_ = other.kernel_;
+    fd_ = other.fd_;
+    other.fd_ = -1;
+  }
+  return *this;
+}
+
+void Descriptor::reset() noexcept {
+  if (fd_ >= 0) kernel_->close(fd_);
+  fd_ = -1;
+}
+
+}  // namespace ftcs::platform

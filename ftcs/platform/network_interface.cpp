@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/network_interface.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <linux/ethtool.h>
+#include <linux/net_tstamp.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+
+namespace ftcs::platform {
+namespace {
+
+ifreq request_for(const std::string& name) {
+  ifreq request{};
+  name.copy(request.ifr_name, IFNAMSIZ - 1);
+  return request;
+}
+
+OsError interface_error(int number, const std::string& name) {
+  OsError error = os_error(number, "interface " + name);
+  // An unknown name is ENODEV from Linux and EINVAL from simulators.
+  if (number == EINVAL) error.kind = OsErrorKind::kNoSuchInterface;
+  return error;
+}
+
+constexpr std::uint32_t kHardware =
+    SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+constexpr std::uint32_t kSoftware =
+    SOF_TIMESTAMPING_TX_SOFTWARE | SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
+
+}  // namespace
+
+Result<InterfaceState, OsError> interface_state(Kernel& kernel, int fd, const std::string& name) {
+  if (name.empty() || name.size() >= IFNAMSIZ) return interface_error(ENODEV, name);
+  ifreq request = request_for(name);
+  if (const int result = kernel.control(fd, SIOCGIFINDEX, &request); result < 0) {
+    return interface_error(-result, name);
+  }
+  InterfaceState state;
+  state.index = request.ifr_ifindex;
+  request = request_for(name);
+  if (const int result = kernel.control(fd, SIOCGIFFLAGS, &request); result < 0) {
+    return interface_error(-result, name);
+  }
+  const auto flags = static_cast<unsigned>(static_cast<unsigned short>(request.ifr_flags));
+  state.up = (flags & IFF_UP) != 0;
+  state.running = (flags & IFF_RUNNING) != 0;
+  state.loopback = (flags & IFF_LOOPBACK) != 0;
+  return state;
+}
+
+Result<InterfaceCapabilities, OsError> interface_capabilities(Kernel& kernel, int fd,
+                                                              const std::string& name) {
+  InterfaceCapabilities capabilities;
+  ifreq request = request_for(name);
+  if (const int result = kernel.control(fd, SIOCGIFHWADDR, &request); result < 0) {
+    return interface_error(-result, name);
+  }
+  std::copy_n(reinterpret_cast<const std::uint8_t*>(request.ifr_hwaddr.sa_data),
+              capabilities.mac.size(), capabilities.mac.begin());
+
+  ethtool_ts_info info{};
+  info.cmd = ETHTOOL_GET_TS_INFO;
+  request = request_for(name);
+  request.ifr_data = reinterpret_cast<char*>(&info);
+  if (kernel.control(fd, SIOCETHTOOL, &request) < 0) {
+    // A driver that cannot say (and a simulator's loopback): the kernel can still stamp in
+    // software.
+    capabilities.software_timestamps = true;
+    return capabilities;
+  }
+  capabilities.software_timestamps = (info.so_timestamping & kSoftware) == kSoftware;
+  capabilities.hardware_timestamps =
+      (info.so_timestamping & kHardware) == kHardware && info.phc_index >= 0;
+  capabilities.phc_index = info.phc_index;
+  capabilities.receive_filters = info.rx_filters;
+  return capabilities;
+}
+
+std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd, const std::string& name) {
+  ifreq request = request_for(name);
+  request.ifr_addr.sa_family = AF_INET;
+  // Only this answer is proof; a simulator does not know the question.
+  const int result = kernel.control(fd, SIOCGIFADDR, &request);
+  if (result == -EADDRNOTAVAIL) return os_error(EADDRNOTAVAIL, "interface " + name);
+  return std::nullopt;
+}
+
+std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const std::string& name,
+                                                  const InterfaceCapabilities& capabilities) {
+  // The narrowest filter that passes PTP event messages over UDP; drivers widen it as they need.
+  constexpr std::array kFilters{HWTSTAMP_FILTER_PTP_V2_L4_EVENT, HWTSTAMP_FILTER_PTP_V2_EVENT,
+                                HWTSTAMP_FILTER_ALL};
+  int result = -ERANGE;
+  for (const auto filter : kFilters) {
+    if ((capabilities.receive_filters & (1U << filter)) == 0) continue;
+    hwtstamp_config config{};
+    config.tx_type = HWTSTAMP_TX_ON;
+    config.rx_filter = filter;
+    ifreq request = request_for(name);
+    request.ifr_data = reinterpret_cast<char*>(&config);
+    result = kernel.control(fd, SIOCSHWTSTAMP, &request);
+    if (result >= 0) return std::nullopt;
+    if (result == -EPERM) break;
+  }
+  return os_error(-result, "hardware time stamping on " + name);
+}
+
+}  // namespace ftcs::platform

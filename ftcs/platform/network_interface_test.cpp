@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// World: one interface, "eth0", of a fake kernel; the machine's own loopback.
+#include "ftcs/platform/network_interface.h"
+
+#include <gtest/gtest.h>
+
+#include "ftcs/platform/fake_kernel.h"
+
+namespace ftcs::platform {
+namespace {
+
+constexpr int kSocket = 3;
+constexpr std::uint32_t kHardware =
+    SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+
+TEST(NetworkInterface, says_which_interface_does_not_exist) {
+  FakeKernel kernel;
+  kernel.interface_exists = false;
+  const auto state = interface_state(kernel, kSocket, "eth7");
+  ASSERT_FALSE(state.ok());
+  EXPECT_EQ(state.error().kind, OsErrorKind::kNoSuchInterface);
+  EXPECT_EQ(state.error().message(), "interface eth7: no such device");
+}
+
+TEST(NetworkInterface, refuses_names_that_the_kernel_would_cut_off) {
+  FakeKernel kernel;
+  EXPECT_FALSE(interface_state(kernel, kSocket, "").ok());
+  EXPECT_FALSE(interface_state(kernel, kSocket, std::string(40, 'e')).ok());
+}
+
+TEST(NetworkInterface, knows_hardware_stamps_only_with_a_hardware_clock) {
+  FakeKernel kernel;
+  kernel.timestamping |= kHardware;
+  EXPECT_FALSE(interface_capabilities(kernel, kSocket, "eth0")->hardware_timestamps);
+  kernel.phc_index = 0;
+  EXPECT_TRUE(interface_capabilities(kernel, kSocket, "eth0")->hardware_timestamps);
+}
+
+TEST(NetworkInterface, reports_why_hardware_stamps_cannot_be_enabled) {
+  FakeKernel kernel;
+  InterfaceCapabilities capabilities;
+  capabilities.receive_filters = 1U << HWTSTAMP_FILTER_PTP_V2_L4_EVENT;
+  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities));
+  kernel.hardware_config_errno = EPERM;
+  const auto denied = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities);
+  ASSERT_TRUE(denied);
+  EXPECT_EQ(denied->kind, OsErrorKind::kNotPermitted);
+  capabilities.receive_filters = 0;
+  const auto none = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->kind, OsErrorKind::kTimestampingUnsupported);
+}
+
+TEST(NetworkInterface, finds_the_machines_loopback) {
+  LinuxKernel kernel;
+  const Descriptor socket(kernel, kernel.socket(AF_INET, SOCK_DGRAM));
+  const auto state = interface_state(kernel, socket.get(), "lo");
+  ASSERT_TRUE(state.ok());
+  EXPECT_TRUE(state->loopback);
+  EXPECT_TRUE(interface_capabilities(kernel, socket.get(), "lo")->software_timestamps);
+}
+
+}  // namespace
+}  // namespace ftcs::platform

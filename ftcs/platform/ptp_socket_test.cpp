@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: MIT
+// World: the interface "eth0" of a fake kernel whose every call can be made to fail; one test sends
+// itself a message through the machine's loopback, on unprivileged ports.
+#include "ftcs/platform/ptp_socket.h"
+
+#include <arpa/inet.h>
+#include <chrono>
+#include <memory>
+#include <unistd.h>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/platform/fake_kernel.h"
+
+namespace ftcs::platform {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+constexpr std::int64_t kMillisecond = 1'000'000;
+constexpr std::uint32_t kHardware =
+    SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+
+Bytes message(std::uint8_t sequence) {
+  Bytes bytes(44, 0);
+  bytes[0] = 1;
+  bytes[31] = sequence;
+  return bytes;
+}
+
+struct Bench {
+  FakeKernel kernel;
+  PtpSocketConfig config;
+  std::unique_ptr<TimestampClock> clock;
+
+  Bench() { config.interface = "eth0"; }
+  Result<PtpSocket, OsError> open(TimestampMode mode = TimestampMode::kBestAvailable) {
+    auto opened = TimestampClock::open(kernel, config.interface, mode);
+    if (!opened) return opened.error();
+    clock = std::move(*opened);
+    return PtpSocket::open(kernel, config, *clock);
+  }
+  OsErrorKind failure(TimestampMode mode = TimestampMode::kBestAvailable) {
+    const auto socket = open(mode);
+    return socket ? OsErrorKind::kSystem : socket.error().kind;
+  }
+};
+
+TEST(PtpSocket, says_what_could_not_be_had) {
+  Bench bench;
+  bench.kernel.interface_exists = false;
+  EXPECT_EQ(bench.failure(), OsErrorKind::kNoSuchInterface);
+  bench.kernel.interface_exists = true;
+  bench.kernel.interface_flags = IFF_BROADCAST;
+  EXPECT_EQ(bench.failure(), OsErrorKind::kInterfaceDown);
+  bench.kernel.interface_flags = IFF_UP;
+  bench.kernel.interface_has_address = false;
+  EXPECT_EQ(bench.failure(), OsErrorKind::kNoAddress);
+  bench.kernel.interface_has_address = true;
+  bench.kernel.bind_errno = EACCES;
+  EXPECT_EQ(bench.failure(), OsErrorKind::kNotPermitted);
+  bench.kernel.bind_errno = EADDRINUSE;
+  const auto busy = bench.open();
+  ASSERT_FALSE(busy.ok());
+  EXPECT_EQ(busy.error().kind, OsErrorKind::kAddressInUse);
+  EXPECT_EQ(busy.error().message(), "UDP port 319: already in use by another program");
+}
+
+TEST(PtpSocket, closes_what_it_opened_when_opening_fails) {
+  Bench bench;
+  bench.kernel.bind_errno = EADDRINUSE;
+  (void)bench.failure();
+  EXPECT_TRUE(bench.kernel.sockets.empty());
+}
+
+TEST(PtpSocket, refuses_hardware_stamps_where_there_are_none) {
+  Bench bench;
+  EXPECT_EQ(bench.failure(TimestampMode::kHardware), OsErrorKind::kTimestampingUnsupported);
+  bench.kernel.timestamping |= kHardware;
+  bench.kernel.phc_index = 0;
+  bench.kernel.open_errno = EACCES;
+  EXPECT_EQ(bench.failure(TimestampMode::kHardware), OsErrorKind::kNotPermitted);
+  bench.kernel.open_errno = ENOENT;
+  EXPECT_EQ(bench.failure(TimestampMode::kHardware), OsErrorKind::kNoSuchDevice);
+}
+
+TEST(PtpSocket, takes_the_best_stamps_there_are_and_says_which) {
+  Bench hardware;
+  hardware.kernel.timestamping |= kHardware;
+  hardware.kernel.phc_index = 0;
+  EXPECT_EQ(hardware.open()->receive_stamps(), StampSource::kHardware);
+  Bench software;
+  EXPECT_EQ(software.open()->receive_stamps(), StampSource::kSoftware);
+  Bench none;
+  none.kernel.timestamping_errno = EINVAL;
+  EXPECT_EQ(none.open()->receive_stamps(), StampSource::kUserSpace);
+  EXPECT_FALSE(none.open(TimestampMode::kSoftware).ok());
+}
+
+TEST(PtpSocket, hardware_stamps_are_passed_on_as_they_are) {
+  Bench bench;
+  bench.kernel.timestamping |= kHardware;
+  bench.kernel.phc_index = 0;
+  auto socket = bench.open(TimestampMode::kHardware);
+  ASSERT_TRUE(socket.ok());
+  const int fd = socket->descriptor(Channel::kEvent);
+  bench.kernel.sockets[fd].received.push_back({message(1), 0, 777});
+  const auto received = socket->receive(Channel::kEvent);
+  ASSERT_TRUE(received.ok() && received->has_value());
+  EXPECT_EQ((*received)->stamp->time, FreeRunningTime::from_ns(777));
+}
+
+TEST(PtpSocket, maps_software_stamps_of_both_directions_to_the_raw_clock) {
+  Bench bench;
+  auto socket = bench.open();
+  ASSERT_TRUE(socket.ok());
+  const int fd = socket->descriptor(Channel::kEvent);
+  const std::int64_t raw = bench.kernel.raw_ns;
+  bench.kernel.sockets[fd].received.push_back({message(9), bench.kernel.realtime_ns, 0});
+  ASSERT_FALSE(socket->send(Channel::kEvent, message(1)));
+  bench.kernel.advance(kMillisecond);
+  const auto transmitted = socket->receive_transmitted();
+  ASSERT_TRUE(transmitted && transmitted->stamp);
+  EXPECT_EQ(transmitted->bytes[31], 1);
+  EXPECT_NEAR((transmitted->stamp->time - FreeRunningTime::from_ns(raw)).ns(), 0.0, 100.0);
+  const auto received = socket->receive(Channel::kEvent);
+  ASSERT_TRUE(received.ok() && received->has_value() && (*received)->stamp);
+  EXPECT_NEAR(((*received)->stamp->time - FreeRunningTime::from_ns(raw)).ns(), 0.0, 100.0);
+}
+
+TEST(PtpSocket, sends_to_the_multicast_group_or_to_the_unicast_peer_of_the_channel) {
+  Bench bench;
+  auto multicast = bench.open();
+  (void)multicast->send(Channel::kGeneral, message(1));
+  EXPECT_EQ(ntohl(bench.kernel.last_destination.sin_addr.s_addr), 0xE0000181U);
+  EXPECT_EQ(ntohs(bench.kernel.last_destination.sin_port), 320);
+  in_addr peer{};
+  peer.s_addr = htonl(0x0A000002);
+  bench.config.unicast = peer;
+  auto unicast = bench.open();
+  (void)unicast->send(Channel::kEvent, message(1));
+  EXPECT_EQ(bench.kernel.last_destination.sin_addr.s_addr, peer.s_addr);
+  EXPECT_EQ(ntohs(bench.kernel.last_destination.sin_port), 319);
+}
+
+TEST(PtpSocket, reports_a_missing_transmit_stamp_once_and_still_matches_it_when_it_comes_late) {
+  Bench bench;
+  bench.kernel.gives_tx_stamps = false;
+  auto socket = bench.open();
+  (void)socket->send(Channel::kEvent, message(1));
+  const std::int64_t sent_at = bench.kernel.realtime_ns;
+  EXPECT_FALSE(socket->overdue());
+  bench.kernel.advance(11 * kMillisecond);
+  const auto overdue = socket->overdue();
+  ASSERT_TRUE(overdue);
+  EXPECT_FALSE(overdue->stamp);
+  EXPECT_FALSE(socket->overdue());
+  EXPECT_EQ(socket->counters().transmit_stamp_missing, 1U);
+
+  (void)socket->send(Channel::kEvent, message(2));
+  bench.kernel.queue_tx_stamp(socket->descriptor(Channel::kEvent), message(1), sent_at, 0);
+  const auto late = socket->receive_transmitted();
+  ASSERT_TRUE(late && late->stamp);
+  EXPECT_EQ(late->bytes[31], 1);
+  EXPECT_EQ(socket->counters().transmit_stamp_late, 1U);
+}
+
+TEST(PtpSocket, falls_back_to_user_space_when_the_driver_never_stamps) {
+  Bench bench;
+  bench.kernel.gives_tx_stamps = false;
+  auto socket = bench.open();
+  for (std::uint8_t i = 0; i < 8; ++i) {
+    (void)socket->send(Channel::kEvent, message(i));
+    bench.kernel.advance(11 * kMillisecond);
+    (void)socket->overdue();
+  }
+  EXPECT_EQ(socket->transmit_stamps(), StampSource::kUserSpace);
+  (void)socket->send(Channel::kEvent, message(99));
+  const auto stamped = socket->overdue();
+  ASSERT_TRUE(stamped && stamped->stamp);
+  EXPECT_EQ(stamped->stamp->source, StampSource::kUserSpace);
+}
+
+TEST(PtpSocket, a_message_without_a_kernel_stamp_or_from_before_a_clock_step_has_none) {
+  Bench bench;
+  auto socket = bench.open();
+  const int fd = socket->descriptor(Channel::kEvent);
+  bench.kernel.sockets[fd].received.push_back({message(1), 0, 0});
+  EXPECT_FALSE((*socket->receive(Channel::kEvent))->stamp);
+  bench.kernel.sockets[fd].received.push_back({message(2), bench.kernel.realtime_ns, 0});
+  bench.kernel.realtime_ns += 1000 * kMillisecond;
+  EXPECT_FALSE((*socket->receive(Channel::kEvent))->stamp);
+  EXPECT_EQ(socket->counters().receive_stamp_missing, 2U);
+  EXPECT_EQ(bench.clock->realtime_steps(), 1U);
+}
+
+TEST(PtpSocket, drops_and_counts_oversized_datagrams) {
+  Bench bench;
+  auto socket = bench.open();
+  const int fd = socket->descriptor(Channel::kGeneral);
+  bench.kernel.sockets[fd].received.push_back({Bytes(9000, 1), 0, 0});
+  EXPECT_FALSE(socket->receive(Channel::kGeneral)->has_value());
+  EXPECT_EQ(socket->counters().oversized, 1U);
+}
+
+TEST(PtpSocket, hears_itself_on_the_machines_loopback_with_kernel_stamps_in_order) {
+  LinuxKernel kernel;
+  PtpSocketConfig config;
+  config.interface = "lo";
+  // Ports of this process alone, below the range of ephemeral ports.
+  config.event_port = static_cast<std::uint16_t>(20000 + 2 * (getpid() % 5000));
+  config.general_port = static_cast<std::uint16_t>(config.event_port + 1);
+  auto clock = TimestampClock::open(kernel, "lo", TimestampMode::kSoftware);
+  ASSERT_TRUE(clock.ok());
+  auto socket = PtpSocket::open(kernel, config, **clock);
+  if (!socket) GTEST_SKIP() << "no multicast on loopback here: " << socket.error().message();
+  const FreeRunningTime before = (*clock)->source().now();
+  if (const auto error = socket->send(Channel::kEvent, message(5))) FAIL() << error->message();
+  std::optional<Stamp> sent;
+  std::optional<Stamp> received;
+  for (int i = 0; i < 100 && !(sent && received); ++i) {
+    std::array<pollfd, 1> poll{{{socket->descriptor(Channel::kEvent), POLLIN | POLLPRI, 0}}};
+    (void)kernel.poll(poll, 10);
+    if ((poll[0].revents & (POLLPRI | POLLERR)) != 0) {
+      if (const auto stamped = socket->receive_transmitted()) sent = stamped->stamp;
+    }
+    if ((poll[0].revents & POLLIN) != 0) {
+      const auto message = socket->receive(Channel::kEvent);
+      if (message.ok() && message->has_value()) received = (*message)->stamp;
+    }
+  }
+  const FreeRunningTime after = (*clock)->source().now();
+  ASSERT_TRUE(sent && received);
+  constexpr Duration kMappingError{std::chrono::microseconds{1}};
+  EXPECT_GE(sent->time + kMappingError, before);
+  EXPECT_GE(received->time + kMappingError, sent->time);
+  EXPECT_GE(after + kMappingError, received->time);
+}
+
+}  // namespace
+}  // namespace ftcs::platform

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/ptp_transport.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <utility>
+
+namespace ftcs::platform {
+namespace {
+
+constexpr Duration kLinkInterval{std::chrono::seconds{1}};
+constexpr Duration kFirstReopenDelay{std::chrono::milliseconds{250}};
+constexpr Duration kLongestReopenDelay{std::chrono::seconds{8}};
+// A signal that arrives just before poll(2) is noticed after this at the latest.
+constexpr Duration kLongestWait{std::chrono::milliseconds{250}};
+
+// Rounded up, so that the deadline has passed when poll(2) returns.
+int poll_timeout_ms(Duration wait) {
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  wait = std::clamp(wait, Duration{}, kLongestWait);
+  return static_cast<int>((wait.floor_ns() + kNsPerMs - 1) / kNsPerMs);
+}
+
+}  // namespace
+
+PtpTransport::PtpTransport(Kernel& kernel, PtpSocketConfig config, TimestampClock& clock,
+                           TransportHandler& handler)
+    : kernel_(kernel), config_(std::move(config)), clock_(clock), handler_(handler) {}
+
+std::optional<OsError> PtpTransport::open() {
+  auto opened = PtpSocket::open(kernel_, config_, clock_);
+  if (!opened) return opened.error();
+  socket_.emplace(std::move(*opened));
+  carrier_is_reported_ = socket_->interface().running;
+  carrier_ = true;
+  suspect_ = false;
+  reopen_delay_ = kFirstReopenDelay;
+  next_check_ = clock_.source().now() + kLinkInterval;
+  return std::nullopt;
+}
+
+std::optional<OsError> PtpTransport::send(Channel channel, std::span<const std::uint8_t> bytes,
+                                          std::optional<in_addr> to) {
+  if (!socket_) return os_error(ENETDOWN, "interface " + config_.interface);
+  auto error = socket_->send(channel, bytes, to);
+  if (error) suspect_ = true;
+  return error;
+}
+
+void PtpTransport::wait_until(FreeRunningTime deadline) {
+  const FreeRunningTime now = clock_.source().now();
+  if (suspect_ || now >= next_check_) check_link(now);
+  report_overdue();
+  poll_sockets(std::min(deadline, next_check_));
+}
+
+void PtpTransport::poll_sockets(FreeRunningTime deadline) {
+  std::array<pollfd, 2> descriptors{};
+  std::size_t count = 0;
+  if (socket_) {
+    constexpr auto kEvents = static_cast<short>(POLLIN | POLLPRI);
+    descriptors[0] = {socket_->descriptor(Channel::kEvent), kEvents, 0};
+    descriptors[1] = {socket_->descriptor(Channel::kGeneral), POLLIN, 0};
+    count = 2;
+    if (const auto overdue = socket_->next_deadline()) deadline = std::min(deadline, *overdue);
+  }
+  const int timeout = poll_timeout_ms(deadline - clock_.source().now());
+  if (kernel_.poll({descriptors.data(), count}, timeout) <= 0) return;
+  constexpr auto kTransmitted = static_cast<short>(POLLPRI | POLLERR);
+  if ((descriptors[0].revents & kTransmitted) != 0) {
+    if (const auto transmitted = socket_->receive_transmitted()) {
+      handler_.on_transmitted(*transmitted);
+    } else if ((descriptors[0].revents & POLLERR) != 0) {
+      receive(Channel::kEvent);  // fetches and so clears a pending error
+    }
+  }
+  if ((descriptors[0].revents & POLLIN) != 0) receive(Channel::kEvent);
+  if ((descriptors[1].revents & (POLLIN | POLLERR)) != 0) receive(Channel::kGeneral);
+}
+
+void PtpTransport::receive(Channel channel) {
+  const auto received = socket_->receive(channel);
+  if (!received) {
+    suspect_ = true;
+  } else if (received->has_value()) {
+    handler_.on_message(**received);
+  }
+}
+
+void PtpTransport::report_overdue() {
+  while (socket_) {
+    const auto message = socket_->overdue();
+    if (!message) return;
+    handler_.on_transmitted(*message);
+  }
+}
+
+void PtpTransport::check_link(FreeRunningTime now) {
+  suspect_ = false;
+  next_check_ = now + kLinkInterval;
+  if (!socket_) return try_to_reopen(now);
+  const auto state =
+      interface_state(kernel_, socket_->descriptor(Channel::kGeneral), config_.interface);
+  if (!state) return lose(state.error().message());
+  if (!state->up) return lose(os_error(ENETDOWN, "interface " + config_.interface).message());
+  if (state->index != socket_->interface().index) {
+    return lose("interface " + config_.interface + ": was replaced");
+  }
+  carrier_is_reported_ = carrier_is_reported_ || state->running;
+  const bool carrier = state->running || !carrier_is_reported_;
+  if (carrier == carrier_) return;
+  carrier_ = carrier;
+  handler_.on_link(carrier, carrier ? "" : "interface " + config_.interface + ": no carrier");
+}
+
+void PtpTransport::lose(const std::string& reason) {
+  const bool was_up = is_up();
+  socket_.reset();
+  next_check_ = clock_.source().now() + reopen_delay_;
+  if (was_up) handler_.on_link(false, reason);
+}
+
+void PtpTransport::try_to_reopen(FreeRunningTime now) {
+  const Duration delay = std::min(reopen_delay_ + reopen_delay_, kLongestReopenDelay);
+  if (open()) {
+    reopen_delay_ = delay;
+    next_check_ = now + delay;
+    return;
+  }
+  handler_.on_link(true, "");
+}
+
+}  // namespace ftcs::platform

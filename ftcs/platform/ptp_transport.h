@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "ftcs/platform/kernel.h"
+#include "ftcs/platform/ptp_socket.h"
+#include "ftcs/platform/timestamp_clock.h"
+
+namespace ftcs::platform {
+
+/// What happened on the network side of a port. Called from PtpTransport::wait_until() only; may
+/// call send().
+class TransportHandler {
+ public:
+  virtual ~TransportHandler() = default;
+  /// `bytes` is valid during the call.
+  virtual void on_message(const ReceivedMessage& message) = 0;
+  /// The timestamp of an event message that was sent, or its absence.
+  virtual void on_transmitted(const TransmittedMessage& message) = 0;
+  /// The link went up or down; `reason` is empty when it came up.
+  virtual void on_link(bool up, const std::string& reason) = 0;
+
+ protected:
+  TransportHandler() = default;
+  TransportHandler(const TransportHandler&) = default;
+  TransportHandler& operator=(const TransportHandler&) = default;
+};
+
+/// The sockets of one port over the life of its link: asks once a second whether the interface is
+/// still there, up and the same (an adapter that was unplugged comes back with another index),
+/// closes the sockets when it is not and opens them again with a growing delay. One thread,
+/// poll(2).
+class PtpTransport {
+ public:
+  PtpTransport(Kernel& kernel, PtpSocketConfig config, TimestampClock& clock,
+               TransportHandler& handler);
+
+  /// The first opening, whose error is the user's to repair.
+  [[nodiscard]] std::optional<OsError> open();
+  /// An error is also noted for the link's sake: the caller need not act on it.
+  std::optional<OsError> send(Channel channel, std::span<const std::uint8_t> bytes,
+                              std::optional<in_addr> to = {});
+  /// Handles what arrives until `deadline` (on the free-running clock), or returns early after an
+  /// event or a signal, and at the latest after a quarter of a second.
+  void wait_until(FreeRunningTime deadline);
+
+  [[nodiscard]] bool is_up() const noexcept { return socket_.has_value() && carrier_; }
+  /// No value while the link is down.
+  [[nodiscard]] const PtpSocket* socket() const noexcept { return socket_ ? &*socket_ : nullptr; }
+
+ private:
+  void poll_sockets(FreeRunningTime deadline);
+  void receive(Channel channel);
+  void report_overdue();
+  void check_link(FreeRunningTime now);
+  void try_to_reopen(FreeRunningTime now);
+  void lose(const std::string& reason);
+
+  Kernel& kernel_;
+  PtpSocketConfig config_;
+  TimestampClock& clock_;
+  TransportHandler& handler_;
+  std::optional<PtpSocket> socket_;
+  bool carrier_ = true;
+  bool carrier_is_reported_ = false;  // some virtual interfaces never say IFF_RUNNING
+  bool suspect_ = false;              // a call failed: look at the link at once
+  FreeRunningTime next_check_{};
+  Duration reopen_delay_{};
+};
+
+}  // namespace ftcs::platform

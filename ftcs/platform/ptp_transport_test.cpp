@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+// World: the interface "eth0" of a fake kernel goes away, comes back, loses its carrier or is
+// replaced.
+#include "ftcs/platform/ptp_transport.h"
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/platform/fake_kernel.h"
+
+namespace ftcs::platform {
+namespace {
+
+struct Recorder final : TransportHandler {
+  std::vector<std::string> events;
+  void on_message(const ReceivedMessage& message) override {
+    events.push_back("message " + std::to_string(message.bytes.size()));
+  }
+  void on_transmitted(const TransmittedMessage& message) override {
+    events.emplace_back(message.stamp ? "stamp" : "no stamp");
+  }
+  void on_link(bool up, const std::string& reason) override {
+    events.push_back(up ? "up" : "down: " + reason);
+  }
+};
+
+struct Bench {
+  FakeKernel kernel;
+  Recorder recorder;
+  std::unique_ptr<TimestampClock> clock =
+      std::move(*TimestampClock::open(kernel, "eth0", TimestampMode::kBestAvailable));
+  PtpTransport transport{kernel, config(), *clock, recorder};
+
+  static PtpSocketConfig config() {
+    PtpSocketConfig config;
+    config.interface = "eth0";
+    return config;
+  }
+  void run_for(std::chrono::seconds time) {
+    const FreeRunningTime end = clock->source().now() + Duration{time};
+    while (clock->source().now() < end) transport.wait_until(end);
+  }
+};
+
+using std::chrono::seconds;
+using Events = std::vector<std::string>;
+
+TEST(PtpTransport, hands_over_messages_and_transmit_stamps) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.sockets[bench.transport.socket()->descriptor(Channel::kGeneral)].received.push_back(
+      {std::vector<std::uint8_t>(64), 0, 0});
+  (void)bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1));
+  bench.run_for(seconds{1});
+  EXPECT_EQ(bench.recorder.events, (Events{"stamp", "message 64"}));
+}
+
+TEST(PtpTransport, reports_an_absent_transmit_stamp_after_its_timeout) {
+  Bench bench;
+  bench.kernel.gives_tx_stamps = false;
+  ASSERT_FALSE(bench.transport.open());
+  (void)bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1));
+  bench.run_for(seconds{1});
+  EXPECT_EQ(bench.recorder.events, (Events{"no stamp"}));
+}
+
+TEST(PtpTransport, survives_an_interface_that_is_unplugged_and_comes_back) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_exists = false;
+  bench.run_for(seconds{5});
+  EXPECT_FALSE(bench.transport.is_up());
+  EXPECT_TRUE(bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1)));
+  bench.kernel.interface_exists = true;
+  bench.kernel.interface_index = 17;
+  bench.run_for(seconds{10});
+  EXPECT_TRUE(bench.transport.is_up());
+  EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: no such device", "up"}));
+}
+
+TEST(PtpTransport, reopens_when_the_interface_was_replaced_between_two_looks) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_index = 3;
+  bench.run_for(seconds{3});
+  EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: was replaced", "up"}));
+  EXPECT_EQ(bench.transport.socket()->interface().index, 3);
+}
+
+TEST(PtpTransport, survives_ifconfig_down_and_up) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_flags = IFF_BROADCAST;
+  bench.kernel.receive_errno = ENETDOWN;
+  bench.kernel.sockets[bench.transport.socket()->descriptor(Channel::kEvent)].received.push_back(
+      {});
+  bench.run_for(seconds{2});
+  bench.kernel.interface_flags = IFF_UP | IFF_RUNNING;
+  bench.run_for(seconds{10});
+  EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: the interface is down", "up"}));
+}
+
+TEST(PtpTransport, keeps_its_sockets_while_the_carrier_is_away) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  const int descriptor = bench.transport.socket()->descriptor(Channel::kEvent);
+  bench.kernel.interface_flags = IFF_UP;
+  bench.run_for(seconds{2});
+  EXPECT_FALSE(bench.transport.is_up());
+  bench.kernel.interface_flags = IFF_UP | IFF_RUNNING;
+  bench.run_for(seconds{2});
+  EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: no carrier", "up"}));
+  EXPECT_EQ(bench.transport.socket()->descriptor(Channel::kEvent), descriptor);
+}
+
+TEST(PtpTransport, looks_at_the_link_at_once_when_sending_fails) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_exists = false;
+  bench.kernel.send_errno = ENODEV;
+  (void)bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1));
+  bench.transport.wait_until(bench.clock->source().now());
+  EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: no such device"}));
+}
+
+TEST(PtpTransport, a_transient_send_error_closes_nothing) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.send_errno = ENOBUFS;
+  EXPECT_TRUE(bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1)));
+  bench.kernel.send_errno = 0;
+  bench.run_for(seconds{2});
+  EXPECT_TRUE(bench.transport.is_up());
+  EXPECT_TRUE(bench.recorder.events.empty());
+}
+
+}  // namespace
+}  // namespace ftcs::platform

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/timestamp_clock.h"
+
+#include <cerrno>
+#include <fcntl.h>
+#include <utility>
+
+namespace ftcs::platform {
+
+const char* name(StampSource source) noexcept {
+  switch (source) {
+    case StampSource::kHardware:
+      return "hardware";
+    case StampSource::kSoftware:
+      return "software";
+    case StampSource::kUserSpace:
+      break;
+  }
+  return "user space";
+}
+
+TimestampClock::TimestampClock(Kernel& kernel, TimestampMode mode,
+                               std::optional<HardwareClock> hardware)
+    : mode_(mode), raw_(kernel), realtime_(kernel), hardware_(std::move(hardware)) {}
+
+FreeRunningSource& TimestampClock::source() noexcept {
+  if (hardware_) return *hardware_;
+  return raw_;
+}
+
+std::optional<Stamp> TimestampClock::convert(const KernelStamps& stamps) noexcept {
+  if (hardware_) {
+    if (stamps.hardware_ns == 0) return std::nullopt;
+    return Stamp{FreeRunningTime::from_ns(stamps.hardware_ns), StampSource::kHardware};
+  }
+  if (stamps.software_ns == 0) return std::nullopt;
+  const auto mapped = realtime_.map(stamps.software_ns);
+  if (!mapped) return std::nullopt;
+  return Stamp{*mapped, StampSource::kSoftware};
+}
+
+Result<std::unique_ptr<TimestampClock>, OsError> TimestampClock::open(Kernel& kernel,
+                                                                      const std::string& interface,
+                                                                      TimestampMode mode) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return os_error(-fd, "socket");
+  const Descriptor socket(kernel, fd);
+  const auto state = interface_state(kernel, fd, interface);
+  if (!state) return state.error();
+  const auto capabilities = interface_capabilities(kernel, fd, interface);
+  if (!capabilities) return capabilities.error();
+
+  const auto without_hardware = [&] {
+    return std::make_unique<TimestampClock>(kernel, mode, std::nullopt);
+  };
+  if (mode == TimestampMode::kSoftware) {
+    if (capabilities->software_timestamps) return without_hardware();
+    return os_error(EOPNOTSUPP, "software time stamping on " + interface);
+  }
+  if (!capabilities->hardware_timestamps) {
+    if (mode == TimestampMode::kBestAvailable) return without_hardware();
+    return os_error(EOPNOTSUPP, "hardware time stamping on " + interface);
+  }
+  const std::string path = "/dev/ptp" + std::to_string(capabilities->phc_index);
+  const int device = kernel.open(path.c_str(), O_RDONLY);
+  if (device >= 0) {
+    HardwareClock clock(kernel, Descriptor(kernel, device));
+    return std::make_unique<TimestampClock>(kernel, mode, std::move(clock));
+  }
+  if (mode == TimestampMode::kBestAvailable) return without_hardware();
+  OsError error = os_error(-device, path);
+  if (device == -ENOENT || device == -ENODEV) error.kind = OsErrorKind::kNoSuchDevice;
+  return error;
+}
+
+}  // namespace ftcs::platform
