@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <variant>
+
+#include "ftcs/ptp/port_state.h"
+#include "ftcs/ptp/wire/codec.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs::ptp {
+
+/// UDP ports 319 and 320 (Annex C). Event messages need a transmit stamp.
+enum class Channel : std::uint8_t { kEvent, kGeneral };
+
+enum class Destination : std::uint8_t {
+  kMulticast,  ///< 224.0.1.129 (Annex C.3)
+  kPeer,       ///< the one address that the configuration names
+  kSender,     ///< where the message came from that is being handled
+};
+
+/// Send these octets. For Channel::kEvent the shell answers with on_transmit_timestamp(sequence_id,
+/// ...) or, if the stamp never comes, on_transmit_timestamp_missing(sequence_id, ...).
+struct SendMessage {
+  Channel channel = Channel::kGeneral;
+  Destination destination = Destination::kMulticast;
+  MessageType type = MessageType::kSync;
+  std::uint16_t sequence_id = 0;
+  MessageBytes bytes{};
+};
+
+/// One timestamped message between the two clocks, for the servo.
+struct EmitPair {
+  EventPair pair{};
+};
+
+struct PortStateChanged {
+  PortState from = PortState::kInitializing;
+  PortState to = PortState::kInitializing;
+  PortEvent event = PortEvent::kInitComplete;
+};
+
+/// A transmitter that was not known is heard for the first time ("new foreign master").
+struct TransmitterSeen {
+  PortIdentity port{};
+};
+
+/// What a transmitter says about itself and its grandmaster.
+struct TransmitterData {
+  PortIdentity port{};
+  Announce announce{};
+  std::uint16_t flags = 0;  ///< flag::kPtpTimescale, kUtcOffsetValid, kLeap61 ...
+  friend constexpr bool operator==(const TransmitterData&,
+                                   const TransmitterData&) noexcept = default;
+};
+
+/// The best transmitter, when it is selected and whenever what it announces changes.
+struct TransmitterSelected {
+  TransmitterData transmitter{};
+  bool changed = false;  ///< port or grandmaster differ from the last selection: another reference
+};
+
+/// The reference advanced differently from our oscillator by more than kJumpTolerance between two
+/// Syncs; the pair that follows already shows the new time. Positive: the reference leapt forward.
+struct ReferenceJumped {
+  Duration jump{};
+};
+
+using Action = std::variant<SendMessage, EmitPair, PortStateChanged, TransmitterSeen,
+                            TransmitterSelected, ReferenceJumped>;
+
+/// What an input brought about, in order. A value: actions may feed new inputs while the list is
+/// walked.
+class ActionList {
+ public:
+  /// The longest list (Announce of a better transmitter at a time receiver) has four.
+  static constexpr std::size_t kCapacity = 8;
+
+  /// False if there is no room.
+  constexpr bool push(const Action& action) noexcept {
+    if (size_ == kCapacity) return false;
+    actions_[size_++] = action;
+    return true;
+  }
+  [[nodiscard]] constexpr std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] constexpr bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] constexpr const Action& operator[](std::size_t i) const noexcept {
+    return actions_[i];
+  }
+  [[nodiscard]] constexpr const Action* begin() const noexcept { return actions_.data(); }
+  [[nodiscard]] constexpr const Action* end() const noexcept { return actions_.data() + size_; }
+
+ private:
+  std::array<Action, kCapacity> actions_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace ftcs::ptp

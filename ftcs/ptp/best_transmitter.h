@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/ptp/actions.h"
+#include "ftcs/time/instant.h"
+
+namespace ftcs::ptp {
+
+/// True if `a` is better than `b`: the data set comparison of IEEE 1588-2019, 9.3.4. Part 1
+/// compares two grandmasters; part 2, two paths to one grandmaster: fewer steps removed, then the
+/// smaller sender. (At a receiver with one port the cases of part 2 that look at the receiver's own
+/// identity all favour the shorter path, or are errors.)
+[[nodiscard]] bool better(const TransmitterData& a, const TransmitterData& b) noexcept;
+
+/// The transmitters that are heard, with the qualification of 9.3.2.5: two Announce messages within
+/// four announce intervals. Fixed capacity.
+class ForeignTransmitters {
+ public:
+  /// 9.3.2.4.3 asks for at least five.
+  static constexpr std::size_t kCapacity = 8;
+
+  enum class Heard : std::uint8_t { kNew, kKnown, kTableFull };
+
+  /// An Announce arrived. A full table gives the place of a transmitter that has fallen silent to a
+  /// newcomer.
+  Heard hear(const TransmitterData& data, Duration announce_interval, FreeRunningTime now) noexcept;
+
+  /// The best of the qualified ones and of `selected`, which needs no further qualification while
+  /// it is in the table; null if there is none. Valid until the next change.
+  [[nodiscard]] const TransmitterData* best(const PortIdentity& selected,
+                                            FreeRunningTime now) const noexcept;
+  /// When `port` counts as silent: `intervals` announce intervals after its last Announce
+  /// (9.2.6.12). None if unknown.
+  [[nodiscard]] std::optional<FreeRunningTime> receipt_timeout(const PortIdentity& port,
+                                                               int intervals) const noexcept;
+
+  void forget(const PortIdentity& port) noexcept;
+  void clear() noexcept { records_ = {}; }
+
+ private:
+  struct Record {
+    bool used = false;
+    bool heard_twice = false;
+    TransmitterData data{};
+    Duration announce_interval{};
+    FreeRunningTime last{};
+    FreeRunningTime before_last{};
+  };
+  [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now) noexcept;
+  [[nodiscard]] const Record* find(const PortIdentity& port) const noexcept;
+  [[nodiscard]] Record* place_for(const PortIdentity& port, FreeRunningTime now) noexcept;
+
+  std::array<Record, kCapacity> records_{};
+};
+
+}  // namespace ftcs::ptp

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/ptp/counters.h"
+
+namespace ftcs::ptp {
+
+std::string_view to_string(Counter counter) noexcept {
+  static constexpr std::array<std::string_view, kCounters> kNames = {"announce_received",
+                                                                     "sync_received",
+                                                                     "follow_up_received",
+                                                                     "delay_req_received",
+                                                                     "delay_resp_received",
+                                                                     "announce_sent",
+                                                                     "sync_sent",
+                                                                     "follow_up_sent",
+                                                                     "delay_req_sent",
+                                                                     "delay_resp_sent",
+                                                                     "forward_pairs",
+                                                                     "backward_pairs",
+                                                                     "truncated",
+                                                                     "oversized",
+                                                                     "wrong_version",
+                                                                     "unknown_type",
+                                                                     "wrong_length",
+                                                                     "bad_timestamp",
+                                                                     "malformed_tlv",
+                                                                     "wrong_sdo",
+                                                                     "wrong_domain",
+                                                                     "own_message",
+                                                                     "wrong_transmitter",
+                                                                     "wrong_requesting_port",
+                                                                     "not_for_this_role",
+                                                                     "alternate_transmitter",
+                                                                     "management_ignored",
+                                                                     "signaling_ignored",
+                                                                     "pdelay_ignored",
+                                                                     "wrong_channel",
+                                                                     "not_listening",
+                                                                     "missed_sync",
+                                                                     "duplicate_sync",
+                                                                     "duplicate_follow_up",
+                                                                     "stale_sync",
+                                                                     "stale_follow_up",
+                                                                     "sequence_restarts",
+                                                                     "lost_follow_up",
+                                                                     "lost_sync",
+                                                                     "stale_delay_resp",
+                                                                     "lost_delay_resp",
+                                                                     "missing_transmit_stamp",
+                                                                     "unexpected_transmit_stamp",
+                                                                     "negative_correction",
+                                                                     "absurd_correction",
+                                                                     "bad_interval",
+                                                                     "reference_jumps",
+                                                                     "unusable_time",
+                                                                     "transmitter_changes",
+                                                                     "announce_timeouts",
+                                                                     "foreign_table_full",
+                                                                     "unusable_announce",
+                                                                     "link_down",
+                                                                     "actions_dropped"};
+  return kNames[static_cast<std::size_t>(counter)];
+}
+
+Counter counter_of(DecodeReason reason) noexcept {
+  constexpr Counter kOf[kDecodeReasons] = {
+      Counter::kTruncated,   Counter::kOversized,    Counter::kWrongVersion, Counter::kUnknownType,
+      Counter::kWrongLength, Counter::kBadTimestamp, Counter::kMalformedTlv};
+  return kOf[static_cast<std::size_t>(reason)];
+}
+
+}  // namespace ftcs::ptp

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "ftcs/ptp/wire/codec.h"
+
+namespace ftcs::ptp {
+
+/// Everything that a port counts. What reaction belongs to each is said here; names are stable
+/// (to_string).
+enum class Counter : std::uint8_t {
+  // Received and used.
+  kAnnounceReceived,
+  kSyncReceived,
+  kFollowUpReceived,
+  kDelayReqReceived,
+  kDelayRespReceived,
+  // Sent.
+  kAnnounceSent,
+  kSyncSent,
+  kFollowUpSent,
+  kDelayReqSent,
+  kDelayRespSent,
+  // Given to the servo.
+  kForwardPairs,
+  kBackwardPairs,
+  // Refused by the decoder: the message is dropped.
+  kTruncated,
+  kOversized,
+  kWrongVersion,
+  kUnknownType,
+  kWrongLength,
+  kBadTimestamp,
+  kMalformedTlv,
+  // Not for us: the message is dropped.
+  kWrongSdo,
+  kWrongDomain,
+  kOwnMessage,            ///< our own multicast, looped back
+  kWrongTransmitter,      ///< Sync, Follow_Up or Delay_Resp of a port that is not selected
+  kWrongRequestingPort,   ///< Delay_Resp to another receiver
+  kNotForThisRole,        ///< as a Delay_Req at a receiver or a Sync at a transmitter
+  kAlternateTransmitter,  ///< alternateMasterFlag is set (17.3)
+  kManagementIgnored,
+  kSignalingIgnored,
+  kPdelayIgnored,
+  kWrongChannel,  ///< event message without a receive stamp, as it came on the general port
+  kNotListening,  ///< while initializing, faulty or without a selected transmitter
+  // Order and loss of Sync and Follow_Up.
+  kMissedSync,         ///< gaps in the sequence; nothing to do
+  kDuplicateSync,      ///< second copy dropped
+  kDuplicateFollowUp,  ///< second copy dropped
+  kStaleSync,          ///< older than one that came before: dropped
+  kStaleFollowUp,     ///< its pair would be older than one already emitted, or its Sync is unknown:
+                      ///< dropped
+  kSequenceRestarts,  ///< a leap of the sequence, as after a restart: unmatched messages are
+                      ///< forgotten
+  kLostFollowUp,      ///< a two-step Sync whose Follow_Up did not come in time: forgotten
+  kLostSync,          ///< a Follow_Up whose Sync did not come in time: forgotten
+  // Delay request and response.
+  kStaleDelayResp,  ///< nothing outstanding with this sequence id (late, duplicate or forged):
+                    ///< dropped
+  kLostDelayResp,   ///< a request that was never answered: forgotten
+  kMissingTransmitStamp,     ///< the exchange (receiver) or the Follow_Up (transmitter) is left out
+  kUnexpectedTransmitStamp,  ///< for a message that we do not wait for: ignored
+  // Values.
+  kNegativeCorrection,  ///< used: 11.6 may make it negative
+  kAbsurdCorrection,    ///< beyond kMaximumCorrection: the message is dropped
+  kBadInterval,         ///< logMessageInterval outside of the profile: the old value stays
+  kReferenceJumps,  ///< the reference leapt against our oscillator: reported, open exchanges are
+                    ///< forgotten
+  kUnusableTime,    ///< a time that no Timestamp can carry: the message is not sent
+  // Transmitters.
+  kTransmitterChanges,
+  kAnnounceTimeouts,  ///< the selected transmitter stopped: back to LISTENING, or to the next best
+                      ///< one
+  kForeignTableFull,  ///< a newcomer was ignored
+  kUnusableAnnounce,  ///< 255 steps removed or more, or a clock that claims our identity (9.3.2.5)
+  kLinkDown,
+  kActionsDropped,  ///< more actions at once than the list holds; a test shows that it stays zero
+};
+inline constexpr std::size_t kCounters = static_cast<std::size_t>(Counter::kActionsDropped) + 1;
+
+/// "wrong_domain": the enumerator's words in lower case. Stable: status files and tests refer to
+/// them.
+[[nodiscard]] std::string_view to_string(Counter counter) noexcept;
+
+/// The counter of a decoder's error.
+[[nodiscard]] Counter counter_of(DecodeReason reason) noexcept;
+
+/// Counts since construction; they only grow.
+class Counters {
+ public:
+  constexpr void add(Counter counter, std::uint64_t times = 1) noexcept {
+    values_[static_cast<std::size_t>(counter)] += times;
+  }
+  [[nodiscard]] constexpr std::uint64_t operator[](Counter counter) const noexcept {
+    return values_[static_cast<std::size_t>(counter)];
+  }
+
+ private:
+  std::array<std::uint64_t, kCounters> values_{};
+};
+
+}  // namespace ftcs::ptp

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/ptp/sync_matcher.h"
+
+#include <algorithm>
+
+#include "ftcs/ptp/sequence.h"
+
+namespace ftcs::ptp {
+
+std::optional<EventPair> SyncMatcher::on_sync(const Header& header, const Sync& sync,
+                                              FreeRunningTime received, FreeRunningTime now,
+                                              Counters& counters) noexcept {
+  expire(now, counters);
+  Slot* slot = find(header.sequence_id);
+  if (slot != nullptr && slot->state != SlotState::kFollowUpWaits) {
+    counters.add(Counter::kDuplicateSync);
+    return std::nullopt;
+  }
+  if (!admit_sync(header.sequence_id, now, counters)) return std::nullopt;
+  slot = find(header.sequence_id);  // a restart has forgotten it
+  const bool follow_up_waits = slot != nullptr;
+  if (!follow_up_waits) slot = &take_slot(header.sequence_id, now, counters);
+  slot->received = received;
+  slot->correction += header.correction;
+  if (!header.has(flag::kTwoStep)) {
+    slot->origin = sync.origin;
+    slot->correction = header.correction;
+    return complete(*slot, counters);
+  }
+  if (follow_up_waits) return complete(*slot, counters);
+  slot->state = SlotState::kSyncWaits;
+  return std::nullopt;
+}
+
+std::optional<EventPair> SyncMatcher::on_follow_up(const Header& header, const FollowUp& follow_up,
+                                                   FreeRunningTime now,
+                                                   Counters& counters) noexcept {
+  expire(now, counters);
+  Slot* slot = find(header.sequence_id);
+  if (slot != nullptr && slot->state != SlotState::kSyncWaits) {
+    counters.add(Counter::kDuplicateFollowUp);
+    return std::nullopt;
+  }
+  const bool sync_waits = slot != nullptr;
+  if (!sync_waits) {
+    const int distance = sequence_distance(header.sequence_id, newest_id_);
+    if (has_newest_ && distance <= 0 && distance > -kReorderWindow) {
+      counters.add(Counter::kStaleFollowUp);
+      return std::nullopt;
+    }
+    slot = &take_slot(header.sequence_id, now, counters);
+    slot->state = SlotState::kFollowUpWaits;
+  }
+  slot->origin = follow_up.precise_origin;
+  slot->correction += header.correction;
+  if (sync_waits) return complete(*slot, counters);
+  return std::nullopt;
+}
+
+bool SyncMatcher::admit_sync(std::uint16_t sequence_id, FreeRunningTime now,
+                             Counters& counters) noexcept {
+  const int distance = sequence_distance(sequence_id, newest_id_);
+  const bool quiet = now - newest_at_ > Duration{kMatchTimeout};
+  if (has_newest_ && distance <= 0 && distance > -kReorderWindow && !quiet) {
+    counters.add(Counter::kStaleSync);
+    return false;
+  }
+  if (has_newest_ && (distance <= 0 || distance > kReorderWindow)) {
+    counters.add(Counter::kSequenceRestarts);
+    for (Slot& slot : slots_) release(slot, counters);
+    has_emitted_ = false;
+  } else if (has_newest_) {
+    counters.add(Counter::kMissedSync, static_cast<std::uint64_t>(distance - 1));
+  }
+  has_newest_ = true;
+  newest_id_ = sequence_id;
+  newest_at_ = now;
+  return true;
+}
+
+std::optional<EventPair> SyncMatcher::complete(Slot& slot, Counters& counters) noexcept {
+  slot.state = SlotState::kDone;
+  if (has_emitted_ && sequence_distance(slot.sequence_id, emitted_id_) <= 0) {
+    counters.add(Counter::kStaleFollowUp);
+    return std::nullopt;
+  }
+  has_emitted_ = true;
+  emitted_id_ = slot.sequence_id;
+  return EventPair{Direction::kForward, slot.origin + slot.correction, slot.received};
+}
+
+SyncMatcher::Slot* SyncMatcher::find(std::uint16_t sequence_id) noexcept {
+  auto* const found = std::ranges::find_if(slots_, [&](const Slot& slot) {
+    return slot.state != SlotState::kFree && slot.sequence_id == sequence_id;
+  });
+  return found == slots_.end() ? nullptr : found;
+}
+
+SyncMatcher::Slot& SyncMatcher::take_slot(std::uint16_t sequence_id, FreeRunningTime now,
+                                          Counters& counters) noexcept {
+  auto* const slot = std::ranges::min_element(slots_, [](const Slot& a, const Slot& b) {
+    if ((a.state == SlotState::kFree) != (b.state == SlotState::kFree)) {
+      return a.state == SlotState::kFree;
+    }
+    return a.since < b.since;
+  });
+  release(*slot, counters);
+  slot->sequence_id = sequence_id;
+  slot->since = now;
+  return *slot;
+}
+
+void SyncMatcher::expire(FreeRunningTime now, Counters& counters) noexcept {
+  for (Slot& slot : slots_) {
+    if (now - slot.since > Duration{kMatchTimeout}) release(slot, counters);
+  }
+}
+
+void SyncMatcher::release(Slot& slot, Counters& counters) noexcept {
+  if (slot.state == SlotState::kSyncWaits) counters.add(Counter::kLostFollowUp);
+  if (slot.state == SlotState::kFollowUpWaits) counters.add(Counter::kLostSync);
+  slot = Slot{};
+}
+
+}  // namespace ftcs::ptp

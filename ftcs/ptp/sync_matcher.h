@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/wire/message.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs::ptp {
+
+/// Joins each two-step Sync with its Follow_Up, whichever comes first (9.5.5, 9.5.10), and emits
+/// forward pairs in the order of their sequence ids: reference = t1 + both corrections,
+/// free_running = t2.
+///
+/// The world it is built for: messages are lost, duplicated and reordered, Follow_Ups lag behind by
+/// several intervals (software stamps at 128 Hz), the transmitter restarts and begins with another
+/// sequence id. In none of these may stamps of two different Syncs meet in a pair.
+class SyncMatcher {
+ public:
+  /// A part whose counterpart has not come after this time is forgotten. Long against any queue,
+  /// short against the time in which 16-bit sequence ids at 128 Hz come round (512 s).
+  static constexpr Nanoseconds kMatchTimeout{1'000'000'000};
+  /// Sequence ids this close are reordering or loss; further apart, the transmitter has restarted.
+  static constexpr int kReorderWindow = 16;
+
+  /// `received` is t2; `now`, when we handle the message. A one-step Sync is a pair by itself.
+  std::optional<EventPair> on_sync(const Header& header, const Sync& sync, FreeRunningTime received,
+                                   FreeRunningTime now, Counters& counters) noexcept;
+  std::optional<EventPair> on_follow_up(const Header& header, const FollowUp& follow_up,
+                                        FreeRunningTime now, Counters& counters) noexcept;
+  void reset() noexcept { *this = SyncMatcher{}; }
+
+ private:
+  enum class SlotState : std::uint8_t { kFree, kSyncWaits, kFollowUpWaits, kDone };
+  struct Slot {
+    SlotState state = SlotState::kFree;
+    std::uint16_t sequence_id = 0;
+    FreeRunningTime since{};
+    FreeRunningTime received{};
+    ReferenceTime origin{};
+    Duration correction{};
+  };
+  /// Four Syncs may be under way at once.
+  static constexpr std::size_t kSlots = 4;
+
+  [[nodiscard]] bool admit_sync(std::uint16_t sequence_id, FreeRunningTime now,
+                                Counters& counters) noexcept;
+  [[nodiscard]] Slot* find(std::uint16_t sequence_id) noexcept;
+  [[nodiscard]] Slot& take_slot(std::uint16_t sequence_id, FreeRunningTime now,
+                                Counters& counters) noexcept;
+  std::optional<EventPair> complete(Slot& slot, Counters& counters) noexcept;
+  void expire(FreeRunningTime now, Counters& counters) noexcept;
+  static void release(Slot& slot, Counters& counters) noexcept;
+
+  std::array<Slot, kSlots> slots_{};
+  bool has_newest_ = false;
+  std::uint16_t newest_id_ = 0;  ///< of the Syncs admitted
+  FreeRunningTime newest_at_{};
+  bool has_emitted_ = false;
+  std::uint16_t emitted_id_ = 0;
+};
+
+}  // namespace ftcs::ptp

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/best_transmitter.h"
+#include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/delay_requests.h"
+#include "ftcs/ptp/sync_matcher.h"
+
+namespace ftcs::ptp {
+
+struct TimeReceiverConfig {
+  PortIdentity port{};                         ///< our own; unique in the network
+  std::uint8_t domain = 0;                     ///< 7.1
+  std::uint8_t major_sdo_id = 0;               ///< 7.1.4; other profiles' messages are not for us
+  std::uint8_t minor_version = 1;              ///< of what we send: 1 = 1588-2019, 0 = 1588-2008
+  std::int8_t log_announce_interval = 1;       ///< only where an Announce does not tell (unicast)
+  std::uint8_t announce_receipt_timeout = 3;   ///< announce intervals, 7.7.3.1; valid: 2 to 10
+  std::int8_t log_min_delay_req_interval = 0;  ///< until a Delay_Resp demands another one
+  bool unicast = false;  ///< Delay_Req to the one configured peer instead of multicast
+  /// delayAsymmetry (7.4.2): positive if the way to us is longer than the way back. Added to both
+  /// pairs' reference (11.6.2, 11.6.3); leave it zero where the measurement layer is given it.
+  Duration delay_asymmetry{};
+  std::uint64_t seed = 1;  ///< of the Delay_Req intervals; give each receiver another one
+};
+
+/// A correctionField beyond this is refused: no network holds a message for a second.
+inline constexpr Nanoseconds kMaximumCorrection{1'000'000'000};
+/// ReferenceJumped from this difference on, plus an eighth of the time between the Syncs: far above
+/// the noise of any clock that can be followed, and half of the smallest jump that operators make
+/// (a leap second).
+inline constexpr Nanoseconds kJumpTolerance{500'000'000};
+
+/// An IEEE 1588-2019 ordinary clock that only receives time: end-to-end delay (11.3), best
+/// transmitter (9.3).
+///
+/// Sans-I/O: bytes and stamps go in, actions come out; it reads no clock and sends nothing itself.
+/// `now` and all event stamps are readings of the free-running clock. `now` must not run backward.
+/// It emits pairs and never judges a delay: that is for measurement and servo. No heap, no
+/// exceptions; each input costs a bounded time.
+class TimeReceiver {
+ public:
+  using Config = TimeReceiverConfig;
+  explicit TimeReceiver(const Config& config) noexcept;
+
+  /// INITIALIZING to LISTENING. Before, everything is ignored.
+  [[nodiscard]] ActionList start(FreeRunningTime now) noexcept;
+  /// A message of the event port with its receive stamp.
+  [[nodiscard]] ActionList on_event_message(std::span<const std::uint8_t> bytes,
+                                            FreeRunningTime received, FreeRunningTime now) noexcept;
+  /// A message of the general port.
+  [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
+                                              FreeRunningTime now) noexcept;
+  /// When the event message with this id left us.
+  [[nodiscard]] ActionList on_transmit_timestamp(std::uint16_t sequence_id, FreeRunningTime sent,
+                                                 FreeRunningTime now) noexcept;
+  /// It is not known and never will be when the event message with this id left us.
+  [[nodiscard]] ActionList on_transmit_timestamp_missing(std::uint16_t sequence_id,
+                                                         FreeRunningTime now) noexcept;
+  [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
+  /// To FAULTY; transmitter and open exchanges are forgotten.
+  [[nodiscard]] ActionList on_link_down(FreeRunningTime now) noexcept;
+  /// From FAULTY to LISTENING.
+  [[nodiscard]] ActionList on_link_up(FreeRunningTime now) noexcept;
+  /// UNCALIBRATED to SLAVE.
+  [[nodiscard]] ActionList on_servo_locked(FreeRunningTime now) noexcept;
+  /// SLAVE to UNCALIBRATED.
+  [[nodiscard]] ActionList on_servo_unlocked(FreeRunningTime now) noexcept;
+
+  /// When on_timer() must be called, if no other input comes first. May lie in the past: then at
+  /// once.
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
+  [[nodiscard]] PortState state() const noexcept { return state_; }
+  /// The selected transmitter; null if there is none.
+  [[nodiscard]] const TransmitterData* transmitter() const noexcept;
+  /// Its Sync interval, once a multicast Sync has told it.
+  [[nodiscard]] std::optional<Duration> sync_interval() const noexcept { return sync_interval_; }
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Input {
+    std::optional<FreeRunningTime> received;
+    FreeRunningTime now{};
+  };
+  struct LastPair {
+    bool known = false;
+    EventPair pair{};
+  };
+
+  void handle(std::span<const std::uint8_t> bytes, const Input& input,
+              ActionList& actions) noexcept;
+  void dispatch(const Message& message, const Input& input, ActionList& actions) noexcept;
+  [[nodiscard]] bool is_for_us(const Header& header) noexcept;
+  [[nodiscard]] bool from_transmitter(const Header& header) noexcept;
+  [[nodiscard]] bool usable_correction(const Header& header) noexcept;
+  void on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
+                   ActionList& actions) noexcept;
+  void on_sync(const Header& header, const Sync& sync, const Input& input,
+               ActionList& actions) noexcept;
+  void on_follow_up(const Header& header, const FollowUp& follow_up, FreeRunningTime now,
+                    ActionList& actions) noexcept;
+  void on_delay_resp(const Header& header, const DelayResp& response, FreeRunningTime now,
+                     ActionList& actions) noexcept;
+  void decide(FreeRunningTime now, ActionList& actions) noexcept;
+  void select(const TransmitterData& data, ActionList& actions) noexcept;
+  void send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept;
+  void emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
+  void check_for_jump(const EventPair& forward, FreeRunningTime now, ActionList& actions) noexcept;
+  void forget_exchanges() noexcept;
+  void change_state(PortState to, PortEvent event, ActionList& actions) noexcept;
+  void push(const Action& action, ActionList& actions) noexcept;
+
+  Config config_;
+  PortState state_ = PortState::kInitializing;
+  ForeignTransmitters foreign_;
+  bool has_transmitter_ = false;
+  bool had_transmitter_ = false;  ///< transmitter_ holds at least the last one
+  TransmitterData transmitter_{};
+  std::optional<Duration> sync_interval_;
+  SyncMatcher matcher_;
+  DelayRequests delay_requests_;
+  LastPair last_forward_;
+  Counters counters_;
+};
+
+}  // namespace ftcs::ptp

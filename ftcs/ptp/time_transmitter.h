@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/counters.h"
+
+namespace ftcs::ptp {
+
+struct TimeTransmitterConfig {
+  PortIdentity port{};             ///< our own; its clock is the grandmaster that we announce
+  std::uint8_t domain = 0;         ///< 7.1
+  std::uint8_t major_sdo_id = 0;   ///< 7.1.4
+  std::uint8_t minor_version = 1;  ///< 1 = 1588-2019, 0 = 1588-2008
+  std::int8_t log_announce_interval = 1;       ///< valid: -7 to 7
+  std::int8_t log_sync_interval = 0;           ///< valid: -7 to 7
+  std::int8_t log_min_delay_req_interval = 0;  ///< demanded of receivers
+  std::uint8_t priority1 = 128;
+  std::uint8_t priority2 = 128;
+  ClockQuality quality{};
+  std::int16_t utc_offset = 37;
+  std::uint16_t announce_flags = 0;  ///< flag::kPtpTimescale, kUtcOffsetValid, kTimeTraceable ...
+  std::uint8_t time_source = 0xA0;   ///< 7.6.2.8; 0xA0 = internal oscillator
+  bool unicast =
+      false;  ///< Announce, Sync and Follow_Up to the one configured peer instead of multicast
+};
+
+/// A grandmaster for the lab: it transmits whatever others announce. Two-step Sync, Announce,
+/// Delay_Resp.
+///
+/// Sans-I/O as TimeReceiver. Its clock *is* the reference: event stamps are ReferenceTime; `now`
+/// only drives timers and is read from the free-running clock. Messages to a receiver that asked by
+/// unicast go back by unicast.
+class TimeTransmitter {
+ public:
+  using Config = TimeTransmitterConfig;
+  explicit TimeTransmitter(const Config& config) noexcept;
+
+  /// INITIALIZING to LISTENING to MASTER; first Announce and Sync are due at once.
+  [[nodiscard]] ActionList start(FreeRunningTime now) noexcept;
+  [[nodiscard]] ActionList on_event_message(std::span<const std::uint8_t> bytes,
+                                            ReferenceTime received, FreeRunningTime now) noexcept;
+  [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
+                                              FreeRunningTime now) noexcept;
+  /// When the Sync with this id left us: the Follow_Up is sent.
+  [[nodiscard]] ActionList on_transmit_timestamp(std::uint16_t sequence_id, ReferenceTime sent,
+                                                 FreeRunningTime now) noexcept;
+  /// No Follow_Up is sent.
+  [[nodiscard]] ActionList on_transmit_timestamp_missing(std::uint16_t sequence_id,
+                                                         FreeRunningTime now) noexcept;
+  [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
+  /// To FAULTY: nothing is sent.
+  [[nodiscard]] ActionList on_link_down(FreeRunningTime now) noexcept;
+  [[nodiscard]] ActionList on_link_up(FreeRunningTime now) noexcept;
+
+  /// When on_timer() must be called; none while nothing is to be sent.
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
+  [[nodiscard]] PortState state() const noexcept { return state_; }
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  /// A Sync whose transmit stamp is awaited.
+  struct OpenSync {
+    bool open = false;
+    std::uint16_t sequence_id = 0;
+  };
+  /// Transmit stamps may lag behind by as many Syncs.
+  static constexpr std::size_t kOpenSyncs = 4;
+
+  void handle(std::span<const std::uint8_t> bytes, std::optional<ReferenceTime> received,
+              ActionList& actions) noexcept;
+  [[nodiscard]] bool is_for_us(const Header& header) noexcept;
+  void answer(const Header& request, ReferenceTime received, ActionList& actions) noexcept;
+  void begin_transmitting(FreeRunningTime now, ActionList& actions) noexcept;
+  void send_announce(ActionList& actions) noexcept;
+  void send_sync(ActionList& actions) noexcept;
+  [[nodiscard]] OpenSync* find(std::uint16_t sequence_id) noexcept;
+  [[nodiscard]] Header header(std::uint16_t sequence_id, std::int8_t log_interval) const noexcept;
+  bool send(const Message& message, Destination destination, ActionList& actions) noexcept;
+  void change_state(PortState to, PortEvent event, ActionList& actions) noexcept;
+  void push(const Action& action, ActionList& actions) noexcept;
+
+  Config config_;
+  Duration announce_interval_;
+  Duration sync_interval_;
+  PortState state_ = PortState::kInitializing;
+  FreeRunningTime next_announce_{};
+  FreeRunningTime next_sync_{};
+  std::uint16_t next_announce_id_ = 0;
+  std::uint16_t next_sync_id_ = 0;
+  std::array<OpenSync, kOpenSyncs> open_syncs_{};
+  Counters counters_;
+};
+
+}  // namespace ftcs::ptp
