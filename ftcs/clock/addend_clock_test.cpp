@@ -159,7 +159,7 @@ TEST(AddendClock, step_is_added_once) {
   EXPECT_NEAR((clock.read().local - kLocalStart).ns(), 11.6e6, 11.0 + 10e6 * 8e-6);
 }
 
-TEST(AddendClock, nothing_is_lost_by_a_million_commands) {
+TEST(AddendClock, commands_in_the_midst_of_a_tick_lose_nothing) {
   // Commands at odd instants within a tick, in the midst of dither periods: the accumulator goes on
   // all the same.
   ManualSource source;

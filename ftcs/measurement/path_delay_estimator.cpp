@@ -10,6 +10,10 @@ namespace {
 /// nothing: a rate known to 1e-8 moves by 160 ns.
 constexpr Duration kLongestTurnaround = Nanoseconds{16'000'000'000};
 
+/// After so long a silence the rate known before says nothing. (It also bounds what rate_ratio()
+/// divides by.)
+constexpr Duration kLongestSilence = Nanoseconds{3'600'000'000'000};
+
 /// Two forward messages whose intervals on the two clocks differ by more than this factor are not
 /// of one reference: no oscillator is off by half, a jump of the time transmitter is.
 constexpr RateLimits kPlausibleRatio{Rate::from_ratio(0.5), Rate::from_ratio(2.0)};
@@ -85,9 +89,10 @@ Rate PathDelayEstimator::rate_ratio() const noexcept {
 }
 
 bool PathDelayEstimator::continues(const Forward& next) const noexcept {
-  const double local = (next.received - newest_forward().received).ns();
-  const double reference = (next.origin - newest_forward().origin).ns();
-  return local > 0.0 && kPlausibleRatio.contains(Rate::from_ratio(reference / local));
+  const Duration local = next.received - newest_forward().received;
+  const Duration reference = next.origin - newest_forward().origin;
+  return local > Duration{} && local <= kLongestSilence &&
+         kPlausibleRatio.contains(Rate::from_ratio(reference.ns() / local.ns()));
 }
 
 const PathDelayEstimator::Forward& PathDelayEstimator::nearest_forward(
