@@ -24,7 +24,6 @@ void FtcsServo::prime(const SyncSample& sample) noexcept {
   if (state_.phase != Phase::kEmpty) return;
   state_.previous = sample;
   state_.phase = Phase::kPrimed;
-  snapshot_.state = ServoState::kUnlocked;
   snapshot_.offset = sample.offset();
   snapshot_.path_delay = sample.path_delay;
 }
@@ -52,6 +51,11 @@ ServoUpdate FtcsServo::update(const SyncSample& sample, const ClockReading& now)
   state_.previous = sample;
   state_.phase = Phase::kActing;
   return {SampleVerdict::kUsed, true, command};
+}
+
+void FtcsServo::reset() noexcept {
+  state_ = State{};
+  snapshot_.state = ServoState::kUnlocked;
 }
 
 double FtcsServo::gain_for(Duration offset) noexcept {

@@ -56,7 +56,7 @@ class FtcsServo {
   /// the delay was known still counts. No effect unless the servo is empty.
   void prime(const SyncSample& sample) noexcept;
   /// Everything measured is void: the next command comes with the second sample and uses p = 1.
-  void reset() noexcept { state_ = State{}; }
+  void reset() noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
 
  private:

@@ -48,7 +48,10 @@ class PicsServo {
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept;
   /// Forgets e(n-1); keeps the rate, because it belongs to the oscillator more than to the
   /// reference.
-  void reset() noexcept { has_previous_ = false; }
+  void reset() noexcept {
+    has_previous_ = false;
+    snapshot_.state = ServoState::kUnlocked;
+  }
   /// The clock has been stepped by somebody else: e(n-1) moves along.
   void on_step(Duration step) noexcept { previous_error_ -= step; }
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
