@@ -1,0 +1,379 @@
+// SPDX-License-Identifier: MIT
+// World: one perfect oscillator that the test moves by hand; a reference that is an affine function
+// of it; a virtual clock on it that the discipline steers. Exact stamps, path delay known (zero)
+// unless a test says otherwise.
+#include "ftcs/discipline/clock_discipline.h"
+
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/clock/virtual_clock.h"
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs {
+namespace {
+using namespace std::chrono_literals;
+
+constexpr Nanoseconds kInterval = 125ms;
+
+class ManualOscillator final : public FreeRunningSource {
+ public:
+  [[nodiscard]] FreeRunningTime now() noexcept override { return now_; }
+  void advance(Duration elapsed) noexcept { now_ = now_ + elapsed; }
+
+ private:
+  FreeRunningTime now_ = FreeRunningTime::from_ns(1'000'000'000);
+};
+
+/// A virtual clock that can be told to refuse commands, and that notes what it was told.
+class WatchedClock final : public AdjustableClock {
+ public:
+  WatchedClock(FreeRunningSource& source, Duration offset, RateLimits limits)
+      : clock_(source,
+               {source.now(), LocalTime{source.now().since_epoch() + offset}, Rate{}, limits}) {}
+
+  [[nodiscard]] ClockReading read() noexcept override { return clock_.read(); }
+  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept override {
+    return clock_.local_at(instant);
+  }
+  [[nodiscard]] RateLimits rate_limits() const noexcept override { return clock_.rate_limits(); }
+  [[nodiscard]] Result<ClockReading, ClockError> apply(
+      const ServoCommand& command) noexcept override {
+    if (refuse) return ClockError::kBusy;
+    last = command;
+    return clock_.apply(command);
+  }
+
+  bool refuse = false;
+  ServoCommand last{};
+
+ private:
+  VirtualClock clock_;
+};
+
+class ClockDisciplineTest : public ::testing::Test {
+ protected:
+  void start(Duration offset, const DisciplineConfig& config) {
+    clock_.emplace(oscillator_, offset, RateLimits::symmetric_ppb(100e6));
+    discipline_.emplace(config, *clock_);
+  }
+  static DisciplineConfig config_for(ServoKind kind) {
+    DisciplineConfig config;
+    config.servo.kind = kind;
+    config.servo.sync_interval = kInterval;
+    config.servo.two_way.fixed_path_delay = 0ns;
+    return config;
+  }
+
+  [[nodiscard]] ReferenceTime reference() {
+    const Duration elapsed = oscillator_.now() - FreeRunningTime::from_ns(1'000'000'000);
+    return ReferenceTime::from_ns(1'000'000'000) + scale(elapsed, reference_rate_) +
+           reference_jump_;
+  }
+  [[nodiscard]] double offset_ns() {
+    return offset_from_reference(clock_->read().local, reference()).ns();
+  }
+  [[nodiscard]] EventPair forward() {
+    return {Direction::kForward, reference(), oscillator_.now()};
+  }
+  void advance(Duration elapsed) { oscillator_.advance(elapsed); }
+  Telemetry sync() { return discipline_->on_pair(forward()); }
+  /// One message now, then an interval without any.
+  Telemetry sync_and_wait() {
+    const Telemetry telemetry = sync();
+    advance(kInterval);
+    return telemetry;
+  }
+
+  ManualOscillator oscillator_;
+  Rate reference_rate_{};
+  Duration reference_jump_{};
+  std::optional<WatchedClock> clock_;
+  std::optional<ClockDiscipline> discipline_;
+};
+
+TEST_F(ClockDisciplineTest, ftcs_is_on_the_reference_one_interval_after_its_first_action) {
+  reference_rate_ = Rate::from_ppm(-50.0);
+  start(Nanoseconds{1ms}, config_for(ServoKind::kFtcs));
+  EXPECT_FALSE(sync_and_wait().commanded);
+  const Telemetry acted = sync_and_wait();
+  EXPECT_TRUE(acted.commanded);
+  EXPECT_EQ(acted.servo.state, ServoState::kLocked);
+  EXPECT_NEAR(acted.tracking_rate.ppm(), -50.0, 1e-6);
+  EXPECT_LT(acted.applied_rate.ppm(), -8'000.0);
+  EXPECT_EQ(acted.step, Duration{});
+  advance(Nanoseconds{10us});  // 125 ms of this oscillator are 6 us less on the reference
+  EXPECT_NEAR(offset_ns(), 0.0, 1e-3);
+  EXPECT_EQ(discipline_->counters().used, 2U);
+  EXPECT_EQ(discipline_->counters().commands, 1U);
+}
+
+TEST_F(ClockDisciplineTest, a_correction_ends_by_itself_when_the_next_sync_is_lost) {
+  start(Nanoseconds{1ms}, config_for(ServoKind::kFtcs));
+  sync_and_wait();
+  sync_and_wait();  // 1 ms is being removed within 125 ms; from here on, nothing comes
+  for (int n = 0; n < 80; ++n) {
+    EXPECT_NEAR(offset_ns(), 0.0, 1e-3) << "after " << n << " lost messages";
+    discipline_->on_silence();
+    advance(kInterval);
+  }
+}
+
+TEST_F(ClockDisciplineTest, late_handling_of_a_message_does_not_disturb) {
+  reference_rate_ = Rate::from_ppm(20.0);
+  start(Nanoseconds{500us}, config_for(ServoKind::kFtcs));
+  for (int n = 0; n < 3; ++n) {
+    const EventPair pair = forward();
+    advance(Nanoseconds{20ms});  // Follow_Up comes late
+    discipline_->on_pair(pair);
+    advance(Nanoseconds{105ms});
+  }
+  EXPECT_NEAR(offset_ns(), 0.0, 0.1);
+}
+
+TEST_F(ClockDisciplineTest, missing_samples_mean_holdover_at_the_tracking_rate) {
+  reference_rate_ = Rate::from_ppm(30.0);
+  start(Nanoseconds{100us}, config_for(ServoKind::kFtcs));
+  for (int n = 0; n < 3; ++n) sync_and_wait();
+  for (int n = 0; n < 3; ++n) {
+    EXPECT_NE(discipline_->on_silence().servo.state, ServoState::kHoldover);
+    advance(kInterval);
+  }
+  EXPECT_NE(discipline_->on_silence().servo.state,
+            ServoState::kHoldover);  // exactly four intervals
+  advance(Nanoseconds{1});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+  EXPECT_FALSE(discipline_->locked());
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+  EXPECT_EQ(discipline_->counters().holdovers, 1U);
+  advance(Nanoseconds{10s});
+  EXPECT_NEAR(offset_ns(), 0.0, 0.1);
+  EXPECT_EQ(sync().servo.state, ServoState::kLocked);
+}
+
+TEST_F(ClockDisciplineTest, no_holdover_before_the_first_sample) {
+  start(Duration{}, config_for(ServoKind::kFtcs));
+  advance(Nanoseconds{60s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kUnlocked);
+  EXPECT_EQ(discipline_->counters().holdovers, 0U);
+}
+
+TEST_F(ClockDisciplineTest, holdover_uses_the_measured_interval_where_none_is_configured) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.sync_interval = 0ns;
+  start(Duration{}, config);
+  sync();
+  advance(Nanoseconds{60s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kUnlocked);  // no interval known yet
+  sync();
+  advance(Nanoseconds{1s});
+  sync();
+  advance(Nanoseconds{4s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kLocked);
+  advance(Nanoseconds{1});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+}
+
+TEST_F(ClockDisciplineTest, a_new_reference_starts_the_servo_again_and_keeps_the_rate) {
+  reference_rate_ = Rate::from_ppm(40.0);
+  start(Nanoseconds{10us}, config_for(ServoKind::kFtcs));
+  for (int n = 0; n < 8; ++n) sync_and_wait();
+  EXPECT_TRUE(discipline_->locked());
+  discipline_->on_new_reference();
+  EXPECT_FALSE(discipline_->locked());
+  EXPECT_EQ(discipline_->latest().servo.state, ServoState::kUnlocked);
+  EXPECT_FALSE(discipline_->latest().servo.offset_known);
+  EXPECT_NEAR(discipline_->latest().tracking_rate.ppm(), 40.0, 1e-6);
+  reference_jump_ = Nanoseconds{-5s};  // the other transmitter lives elsewhere
+  EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kUsed);
+  EXPECT_EQ(discipline_->counters().new_references, 1U);
+  EXPECT_EQ(discipline_->counters().implausible, 0U);
+}
+
+TEST_F(ClockDisciplineTest, never_steps_unless_the_policy_permits_it) {
+  DisciplineConfig config = config_for(ServoKind::kLinuxptpPi);
+  start(Nanoseconds{1ms}, config);
+  sync_and_wait();
+  const Telemetry acted = sync_and_wait();
+  EXPECT_TRUE(acted.commanded);
+  EXPECT_EQ(acted.step, Duration{});  // ptp4l would have stepped
+  EXPECT_EQ(discipline_->counters().steps, 0U);
+  EXPECT_NEAR(offset_ns(), 1e6, 1.0);
+}
+
+TEST_F(ClockDisciplineTest, lets_linuxptp_pi_take_its_first_step) {
+  DisciplineConfig config = config_for(ServoKind::kLinuxptpPi);
+  config.step.mode = StepMode::kFirst;
+  config.step.threshold = 1ns;  // not asked: this servo decides itself
+  start(Nanoseconds{1ms}, config);
+  sync_and_wait();
+  EXPECT_EQ(sync_and_wait().step, Duration{Nanoseconds{-1ms}});
+  EXPECT_NEAR(offset_ns(), 0.0, 1.0);
+  reference_jump_ = Nanoseconds{10us};
+  EXPECT_EQ(sync_and_wait().step, Duration{});
+  EXPECT_EQ(discipline_->counters().steps, 1U);
+}
+
+TEST_F(ClockDisciplineTest, steps_for_ftcs_with_the_first_command_only) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.step = {StepMode::kFirst, 20us};
+  config.servo.two_way.gate_enabled = false;
+  reference_rate_ = Rate::from_ppm(-50.0);
+  start(Nanoseconds{3s}, config);
+  sync_and_wait();
+  EXPECT_NEAR(sync_and_wait().step.ns(), -3e9, 1e4);
+  EXPECT_NEAR(offset_ns(), 0.0, 1e-3);
+  reference_jump_ = Nanoseconds{1ms};
+  EXPECT_EQ(sync_and_wait().step, Duration{});
+}
+
+TEST_F(ClockDisciplineTest, steps_whenever_the_policy_says_always) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.step = {StepMode::kAlways, 20us};
+  config.servo.two_way.gate_enabled = false;
+  start(Nanoseconds{20us}, config);
+  sync_and_wait();
+  EXPECT_EQ(sync_and_wait().step, Duration{});  // at the threshold is not above it
+  sync_and_wait();
+  reference_jump_ = Nanoseconds{1ms};
+  EXPECT_NE(sync_and_wait().step, Duration{});
+  EXPECT_EQ(discipline_->counters().steps, 1U);
+}
+
+TEST_F(ClockDisciplineTest, a_step_does_not_kick_the_incremental_pi) {
+  DisciplineConfig config = config_for(ServoKind::kPics);
+  config.step = {StepMode::kFirst, 20us};
+  config.servo.limits = RateLimits::symmetric_ppb(1e6);
+  start(Nanoseconds{10ms}, config);
+  EXPECT_EQ(sync_and_wait().step, Duration{Nanoseconds{-10ms}});
+  EXPECT_NEAR(offset_ns(), -125'000.0, 1.0);  // the first command stands at its limit of -1000 ppm
+  // e(1) - e(0) is 125 us, with e(0) = 0 after the step; unshifted it would be 10 ms and stay at
+  // the limit.
+  EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), 1000.0, 1e-6);
+  sync_and_wait();
+  sync_and_wait();
+  EXPECT_NEAR(offset_ns(), 0.0, 1.0);
+}
+
+TEST_F(ClockDisciplineTest, refuses_an_absurd_first_offset) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.largest_first_offset = 1s;
+  start(Nanoseconds{1'000'000'001ns}, config);
+  for (int n = 0; n < 4; ++n) {
+    const Telemetry telemetry = sync_and_wait();
+    EXPECT_FALSE(telemetry.commanded);
+    EXPECT_EQ(telemetry.offset_refused, n > 0);
+  }
+  EXPECT_EQ(discipline_->counters().refused, 3U);
+  start(Nanoseconds{1s}, config);
+  sync_and_wait();
+  EXPECT_TRUE(sync_and_wait().commanded);
+  config.step.mode = StepMode::kFirst;
+  start(Nanoseconds{2s}, config);
+  sync_and_wait();
+  EXPECT_TRUE(sync_and_wait().commanded);
+  EXPECT_NEAR(offset_ns(), 0.0, 1e-3);
+}
+
+TEST_F(ClockDisciplineTest, no_rate_beyond_either_limit_reaches_the_clock) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.limits = {Rate::from_ppm(-1000.0), Rate::from_ratio(1.5)};
+  start(Nanoseconds{-100ms},
+        config);  // 800,000 ppm to catch up in one interval; the clock takes 100,000
+  sync_and_wait();
+  EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), 100'000.0, 1e-6);
+  EXPECT_EQ(discipline_->counters().clamps, 1U);
+  start(Nanoseconds{100ms}, config);
+  sync_and_wait();
+  EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), -1000.0, 1e-6);
+}
+
+TEST_F(ClockDisciplineTest, a_refused_command_is_reported_and_the_next_one_repairs_it) {
+  start(Nanoseconds{1ms}, config_for(ServoKind::kFtcs));
+  sync_and_wait();
+  clock_->refuse = true;
+  const Telemetry failed = sync_and_wait();
+  EXPECT_FALSE(failed.commanded);
+  EXPECT_EQ(failed.error, ClockError::kBusy);
+  EXPECT_EQ(discipline_->counters().apply_errors, 1U);
+  EXPECT_NEAR(offset_ns(), 1e6, 1e-3);
+  clock_->refuse = false;
+  const Telemetry worked = sync_and_wait();
+  EXPECT_TRUE(worked.commanded);
+  EXPECT_EQ(worked.error, std::nullopt);
+}
+
+TEST_F(ClockDisciplineTest, counts_what_became_of_every_message) {
+  start(Duration{}, config_for(ServoKind::kFtcs));
+  for (int n = 0; n < 20; ++n) sync_and_wait();
+  const EventPair pair = forward();
+  discipline_->on_pair(pair);
+  discipline_->on_pair(pair);
+  advance(kInterval);
+  EventPair outlier = forward();
+  outlier.reference = outlier.reference - Nanoseconds{50us};  // arrives 50 us late
+  const Telemetry rejected = discipline_->on_pair(outlier);
+  EXPECT_EQ(rejected.verdict, SampleVerdict::kRejected);
+  EXPECT_FALSE(rejected.commanded);
+  discipline_->on_pair({Direction::kBackward, reference(), oscillator_.now()});
+  const DisciplineCounters& counters = discipline_->counters();
+  EXPECT_EQ(counters.used, 21U);
+  EXPECT_EQ(counters.duplicate, 1U);
+  EXPECT_EQ(counters.rejected, 1U);
+  EXPECT_EQ(counters.backward, 1U);
+  EXPECT_EQ(counters.implausible, 0U);
+  EXPECT_EQ(counters.commands, 20U);
+}
+
+TEST_F(ClockDisciplineTest, the_free_running_servo_reports_and_leaves_the_clock_alone) {
+  reference_rate_ = Rate::from_ppm(25.0);
+  start(Nanoseconds{7us}, config_for(ServoKind::kFreeRunning));
+  for (int n = 0; n < 3; ++n) EXPECT_FALSE(sync_and_wait().commanded);
+  EXPECT_NEAR(discipline_->latest().servo.rate_ratio.ppm(), 25.0, 1e-6);
+  EXPECT_NEAR(discipline_->latest().servo.offset.ns(), 7'000.0 - 2 * 3'125.0, 1e-3);
+  EXPECT_EQ(discipline_->counters().commands, 0U);
+}
+
+TEST_F(ClockDisciplineTest, locks_after_the_dwell_and_loses_the_lock_outside_the_band) {
+  DisciplineConfig config = config_for(ServoKind::kFreeRunning);
+  config.lock = {{Nanoseconds{100}, Nanoseconds{1'000}}, 3};
+  config.servo.two_way.gate_enabled = false;
+  start(Nanoseconds{99}, config);
+  EXPECT_FALSE(sync_and_wait().locked);
+  EXPECT_FALSE(sync_and_wait().locked);
+  EXPECT_TRUE(sync_and_wait().locked);
+  reference_jump_ = Nanoseconds{-900};  // offset 999
+  EXPECT_TRUE(sync_and_wait().locked);
+  reference_jump_ = Nanoseconds{-901};
+  EXPECT_FALSE(sync_and_wait().locked);
+}
+
+TEST_F(ClockDisciplineTest, an_unknown_path_delay_is_no_offset_and_no_lock) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.two_way.fixed_path_delay.reset();
+  start(Duration{}, config);
+  for (int n = 0; n < 8; ++n) {
+    const Telemetry telemetry = sync_and_wait();
+    EXPECT_FALSE(telemetry.servo.offset_known);
+    EXPECT_FALSE(telemetry.commanded);
+    EXPECT_FALSE(telemetry.locked);
+  }
+}
+
+TEST_F(ClockDisciplineTest, allocates_nothing) {
+  for (const ServoKindName& entry : kServoKinds) {
+    start(Nanoseconds{1ms}, config_for(entry.kind));
+    const test::ForbidAllocation guard;
+    for (int n = 0; n < 50; ++n) {
+      sync();
+      discipline_->on_pair({Direction::kBackward, reference(), oscillator_.now()});
+      advance(kInterval);
+      discipline_->on_silence();
+    }
+    discipline_->on_new_reference();
+  }
+}
+
+}  // namespace
+}  // namespace ftcs
