@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace ftcs {
+
+/// Why a file could not be written, for people: "cannot write report.html: No space left on
+/// device".
+struct WriteError {
+  std::string message;
+};
+
+/// Writes the whole content or nothing: into `path`.part first, which then takes the place of
+/// `path`, so that a full disk leaves an older result as it was. What exists and is no regular file
+/// (a device, a pipe) is written to directly. No value: done.
+[[nodiscard]] std::optional<WriteError> write_file(const std::filesystem::path& path,
+                                                   std::string_view content);
+
+}  // namespace ftcs

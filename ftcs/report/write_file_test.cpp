@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// World: a scratch folder, a folder that does not exist, and /dev/full, the disk that is always
+// full.
+#include "ftcs/report/write_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <gtest/gtest.h>
+
+namespace ftcs {
+namespace {
+
+class WriteFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  static std::string content(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(WriteFile, writes_all_bytes_and_leaves_nothing_else) {
+  const std::string text("a\0b\n", 4);
+  EXPECT_FALSE(write_file(folder_ / "x", text).has_value());
+  EXPECT_EQ(content(folder_ / "x"), text);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(WriteFile, replaces_an_older_result) {
+  EXPECT_FALSE(write_file(folder_ / "x", "old and long").has_value());
+  EXPECT_FALSE(write_file(folder_ / "x", "new").has_value());
+  EXPECT_EQ(content(folder_ / "x"), "new");
+}
+
+TEST_F(WriteFile, names_the_file_and_the_reason) {
+  const auto error = write_file(folder_ / "missing" / "x", "text");
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("missing/x: No such file or directory"), std::string::npos);
+  EXPECT_TRUE(write_file(folder_, "text").has_value());  // a folder is no file
+}
+
+TEST_F(WriteFile, reports_a_full_disk) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  const auto error = write_file("/dev/full", std::string(100000, 'x'));
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("No space left on device"), std::string::npos);
+  EXPECT_TRUE(
+      write_file("/dev/full", "short").has_value());  // noticed at the latest when it is closed
+}
+
+// The part file is a link to the full disk: the older result must survive.
+TEST_F(WriteFile, keeps_the_older_result_when_the_disk_is_full) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  EXPECT_FALSE(write_file(folder_ / "x", "finished").has_value());
+  std::filesystem::create_symlink("/dev/full", folder_ / "x.part");
+  EXPECT_TRUE(write_file(folder_ / "x", "new").has_value());
+  EXPECT_EQ(content(folder_ / "x"), "finished");
+}
+
+}  // namespace
+}  // namespace ftcs
