@@ -26,7 +26,8 @@ double by_definition(std::span<const double> x, std::size_t n) {
 }
 
 // allantools 2024.06 mtie() on the generator of NIST SP 1065, 12.4, started from 1234567, with its
-// mean frequency removed; as published in the tests of the Rust library kshana 0.25 (mtie_reference.rs).
+// mean frequency removed; as published in the tests of the Rust library kshana 0.25
+// (mtie_reference.rs).
 TEST(Mtie, equals_the_figures_of_an_independent_program) {
   std::vector<double> frequency;
   std::int64_t n = 1234567;

@@ -75,7 +75,8 @@ TEST(HtmlReportInBrowser, opens_without_a_console_message_and_shows_its_plots) {
       (folder / "log").string() + "'";
   ASSERT_EQ(std::system(command.c_str()), 0) << content(folder / "log");
   const std::string log = content(folder / "log");
-  const std::string dom = content(folder / "dom");
+  std::string dom = content(folder / "dom");
+  dom.resize(dom.find("<script"));  // the library's own text would be counted too
   EXPECT_EQ(log.find("CONSOLE"), std::string::npos) << log;
   EXPECT_EQ(count(dom, "<canvas"), 8);  // dygraphs lays two over each other for every plot
   EXPECT_GT(count(dom, "dygraph-axis-label-x"), 8);

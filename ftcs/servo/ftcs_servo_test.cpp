@@ -132,7 +132,8 @@ TEST(FtcsServo, acts_once_with_full_weight_then_with_the_offset_gain) {
   step(servo, plant);
   EXPECT_EQ(servo.snapshot().offset_gain, 1.0);
   plant.advance_reference(kInterval);
-  plant.apply({Rate{}, Duration{}, Rate{}, Duration{Nanoseconds{8us}}});  // a disturbance: 8 us ahead
+  plant.apply(
+      {Rate{}, Duration{}, Rate{}, Duration{Nanoseconds{8us}}});  // a disturbance: 8 us ahead
   step(servo, plant);
   EXPECT_EQ(servo.snapshot().offset_gain, 0.25);
   plant.advance_reference(kInterval);
