@@ -12,6 +12,15 @@ LawConfig with_common(LawConfig law, const ServoConfig& common) noexcept {
   return law;
 }
 
+AdaptiveConfig with_common(AdaptiveConfig servo, const ServoConfig& common) noexcept {
+  if (common.sync_interval != Nanoseconds{0}) servo.sync_interval = common.sync_interval;
+  if (!servo.fixed_path_delay.has_value()) {
+    servo.fixed_path_delay = common.two_way.fixed_path_delay;
+  }
+  servo.steering.rate = intersect(servo.steering.rate, common.limits);
+  return servo;
+}
+
 }  // namespace
 
 std::string_view servo_kind_name(ServoKind kind) noexcept {
@@ -39,6 +48,8 @@ std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
       return validate(with_common(config.linuxptp_pi, config));
     case ServoKind::kFreeRunning:
       return validate(config.free_running);
+    case ServoKind::kAdaptive:
+      return validate(with_common(config.adaptive, config));
   }
   return std::nullopt;
 }
@@ -47,16 +58,20 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
   const TwoWayConfig& two_way = config.two_way;
   switch (config.kind) {
     case ServoKind::kFtcs:
-      return AnyServo{TwoWayServo<FtcsServo>{two_way, with_common(config.ftcs, config)}};
+      return AnyServo{std::in_place_type<TwoWayServo<FtcsServo>>, two_way,
+                      with_common(config.ftcs, config)};
     case ServoKind::kPics:
-      return AnyServo{TwoWayServo<PicsServo>{two_way, with_common(config.pics, config)}};
+      return AnyServo{std::in_place_type<TwoWayServo<PicsServo>>, two_way,
+                      with_common(config.pics, config)};
     case ServoKind::kLinuxptpPi:
-      return AnyServo{
-          TwoWayServo<LinuxptpPiServo>{two_way, with_common(config.linuxptp_pi, config)}};
+      return AnyServo{std::in_place_type<TwoWayServo<LinuxptpPiServo>>, two_way,
+                      with_common(config.linuxptp_pi, config)};
+    case ServoKind::kAdaptive:
+      return AnyServo{std::in_place_type<AdaptiveServo>, with_common(config.adaptive, config)};
     case ServoKind::kFreeRunning:
       break;
   }
-  return AnyServo{TwoWayServo<FreeRunningServo>{two_way, config.free_running}};
+  return AnyServo{std::in_place_type<TwoWayServo<FreeRunningServo>>, two_way, config.free_running};
 }
 
 ServoUpdate AnyServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <variant>
 
+#include "ftcs/servo/adaptive/adaptive_servo.h"
 #include "ftcs/servo/free_running_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/linuxptp_pi_servo.h"
@@ -19,7 +21,7 @@ namespace ftcs {
 // A further servo needs one line in each of: ServoKind, kServoKinds, ServoConfig, AnyServo::Variant
 // and, in any_servo.cpp, make_servo and validate.
 
-enum class ServoKind : std::uint8_t { kFtcs, kPics, kLinuxptpPi, kFreeRunning };
+enum class ServoKind : std::uint8_t { kFtcs, kPics, kLinuxptpPi, kFreeRunning, kAdaptive };
 
 struct ServoKindName {
   ServoKind kind;
@@ -28,9 +30,8 @@ struct ServoKindName {
 
 /// Every servo with the name it has on the command line and in files.
 inline constexpr ServoKindName kServoKinds[] = {
-    {ServoKind::kFtcs, "ftcs"},
-    {ServoKind::kPics, "pics"},
-    {ServoKind::kLinuxptpPi, "linuxptp-pi"},
+    {ServoKind::kAdaptive, "adaptive"}, {ServoKind::kFtcs, "ftcs"},
+    {ServoKind::kPics, "pics"},         {ServoKind::kLinuxptpPi, "linuxptp-pi"},
     {ServoKind::kFreeRunning, "none"},
 };
 
@@ -49,6 +50,7 @@ struct ServoConfig {
   PicsConfig pics{};
   LinuxptpPiConfig linuxptp_pi{};
   FreeRunningConfig free_running{};
+  AdaptiveConfig adaptive{};
 };
 
 /// Of the chosen kind only.
@@ -57,10 +59,14 @@ struct ServoConfig {
 /// Any servo as one value, chosen at run time: a closed set, so no virtual functions and no heap.
 class AnyServo {
  public:
-  using Variant = std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>,
-                               TwoWayServo<LinuxptpPiServo>, TwoWayServo<FreeRunningServo>>;
+  using Variant =
+      std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>, TwoWayServo<LinuxptpPiServo>,
+                   TwoWayServo<FreeRunningServo>, AdaptiveServo>;
 
-  explicit AnyServo(const Variant& servo) noexcept : servo_(servo) {}
+  /// In place: the adaptive servo is too large to pass through the stack of a real-time thread.
+  template <class Servo, class... Configs>
+  explicit AnyServo(std::in_place_type_t<Servo> type, const Configs&... configs) noexcept
+      : servo_(type, configs...) {}
 
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept;

@@ -17,6 +17,7 @@ enum class ServoConfigError : std::uint8_t {
   kProportionalGain,
   kIntegralGain,
   kStepThreshold,
+  kActuator,
 };
 
 /// One sentence: what was expected.
@@ -40,6 +41,8 @@ enum class ServoConfigError : std::uint8_t {
       return "the integral gain must be finite and not negative";
     case ServoConfigError::kStepThreshold:
       return "a step threshold must not be negative";
+    case ServoConfigError::kActuator:
+      return "latency, granularity and largest rate change must be finite and not negative";
   }
   return "unknown configuration error";
 }

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "ftcs/servo/adaptive/estimator.h"
+#include "ftcs/servo/adaptive/steering.h"
+#include "ftcs/servo/servo.h"
+#include "ftcs/servo/servo_config_error.h"
+
+namespace ftcs {
+
+/// Nothing here needs tuning: everything is a fact about the installation.
+struct AdaptiveConfig {
+  /// Interval between Sync messages in reference time. Zero: measured.
+  Nanoseconds sync_interval{0};
+  SteeringLimits steering{};
+  /// Path delay known otherwise (peer delay, wiring), and its standard deviation. Then one
+  /// direction suffices from the second message on.
+  std::optional<Nanoseconds> fixed_path_delay{};
+  Nanoseconds path_delay_sigma{0};
+};
+
+[[nodiscard]] std::optional<ServoConfigError> validate(const AdaptiveConfig& config) noexcept;
+
+/// The adaptive clock servo: joint estimate of offset, rate and path delay from every timestamp
+/// pair of either direction, with noise learnt on line, and the paper's deadbeat steering on the
+/// filtered estimate. Derivation: docs/adaptive-servo.md.
+template <class Grid, std::size_t Window>
+class BasicAdaptiveServo {
+ public:
+  using Config = AdaptiveConfig;
+
+  explicit BasicAdaptiveServo(const AdaptiveConfig& config = {}) noexcept;
+
+  ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
+  void reset() noexcept;
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
+
+ private:
+  [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
+  [[nodiscard]] adaptive::Observation observe(const TimestampPair& pair) noexcept;
+  void measure_interval(const TimestampPair& pair, bool had_previous) noexcept;
+  [[nodiscard]] bool ready() const noexcept;
+  [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
+  void publish(double offset_ns) noexcept;
+
+  AdaptiveConfig config_;
+  adaptive::Estimator<Grid, Window> estimator_;
+  adaptive::Steering steering_;
+  double interval_ns_ = 0.0;
+  bool started_ = false;
+  bool interval_known_ = false;
+  Duration base_{};  ///< first z: keeps the states small
+  TimestampPair latest_[2] = {};
+  bool has_latest_[2] = {};
+  ReferenceTime event_{};  ///< of the last message, reference time at the local clock
+  ServoSnapshot snapshot_{};
+};
+
+using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid, 32>;
+
+extern template class BasicAdaptiveServo<adaptive::FullGrid, 32>;
+static_assert(ClockServo<AdaptiveServo>);
+
+}  // namespace ftcs

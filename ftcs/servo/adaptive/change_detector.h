@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "ftcs/servo/adaptive/noise_model.h"
+
+namespace ftcs::adaptive {
+
+/// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between the models of a
+/// bank: C_ij = max(0, C_ij + l_j - l_i) for every model j that stands behind i, i.e. is wilder.
+/// Beyond the threshold model i has been overtaken by events and takes over the state of the most
+/// convincing j; this shortens the memory of calm models at once after a change.
+template <class Grid>
+class ChangeDetector {
+ public:
+  static constexpr std::size_t kSize = Grid::kSize;
+  static constexpr std::size_t kCalm = kSize - Grid::kJumps;
+  static constexpr std::size_t kNone = kSize;
+
+  void add(const std::array<double, kSize>& log_density) noexcept {
+    std::array<float, kSize> l{};
+    for (std::size_t j = 0; j < kSize; ++j) l[j] = static_cast<float>(log_density[j]);
+    for (std::size_t i = 0; i < kCalm; ++i) {
+      for (std::size_t j = 0; j < kSize; ++j) {
+        sums_[i][j] = std::max(0.0F, sums_[i][j] + (l[j] - l[i]));
+      }
+    }
+  }
+
+  /// The model that overtakes calm model i after `count` messages, or kNone. Clears its sums.
+  [[nodiscard]] std::size_t take_over(std::size_t i, double count) noexcept {
+    // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
+    const auto calm_threshold = static_cast<float>(kThreshold * (1.0 + 16.0 / count));
+    std::size_t winner = kNone;
+    float largest = 0.0F;
+    for (std::size_t j = i + 1; j < kSize; ++j) {
+      const float threshold = j < kCalm ? calm_threshold : kJumpThreshold;
+      if (sums_[i][j] > threshold && sums_[i][j] > largest) {
+        largest = sums_[i][j];
+        winner = j;
+      }
+    }
+    if (winner != kNone) sums_[i].fill(0.0F);
+    return winner;
+  }
+
+  void clear() noexcept { sums_ = {}; }
+
+ private:
+  /// Nats. 11: one false alarm per e^11 = 60,000 messages and pair of models at most (Wald).
+  static constexpr double kThreshold = 11.0;
+  /// Jumps explain everything for a while; they must be far ahead.
+  static constexpr float kJumpThreshold = 30.0F;
+
+  std::array<std::array<float, kSize>, kCalm> sums_{};
+};
+
+}  // namespace ftcs::adaptive

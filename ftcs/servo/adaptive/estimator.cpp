@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/servo/adaptive/estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ftcs::adaptive {
+namespace {
+
+/// Start of offset (beyond the first reading), rate and delay, in units of s and s per cycle: wide
+/// enough to be forgotten with the first message that sees them.
+constexpr double kOffsetPrior = 4e10;
+constexpr double kRatePrior = 1e10;
+constexpr double kDelayPrior = 1e10;
+/// An early packet is no queueing; only a broken stamp makes one.
+constexpr double kEarlyOutliers = 1e-5;
+constexpr double kOutlierRate = 0.02;
+constexpr double kFewestOutliers = 0.001;
+constexpr double kMostOutliers = 0.2;
+/// Messages after which each of these may begin; before, every prediction is still prior.
+constexpr std::uint32_t kEvidenceFrom = 3;
+constexpr std::uint32_t kMixFrom = 4;
+constexpr std::uint32_t kJudgeFrom = 6;
+constexpr std::uint32_t kLearnFrom = 16;
+/// One innovation, normalised and squared, counts at most this much as evidence.
+constexpr double kEvidenceLimit = 12.0;
+constexpr double kEvidenceMemory = 4000.0;
+constexpr std::uint32_t kYoung = 100;
+constexpr std::uint8_t kRejectedInARow = 10;
+constexpr double kRejected = 0.1;
+constexpr double kSmallestScale = 1e-4;
+
+std::size_t index_of(Direction direction) noexcept {
+  return direction == Direction::kForward ? 0 : 1;
+}
+double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
+
+}  // namespace
+
+template <class Grid, std::size_t Window>
+bool Estimator<Grid, Window>::observable() const noexcept {
+  return two_way() || known_delay_.known() || count_ > kMixFrom;
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::begin(Direction direction) noexcept {
+  Estimate start;
+  start.xx = kOffsetPrior;
+  start.yy = kRatePrior;
+  if (known_delay_.known()) {
+    start.d = known_delay_.mean_ns;
+    start.dd = known_delay_.sigma_ns * known_delay_.sigma_ns / (scale_ * scale_);
+  }
+  bank_.start(start);
+  seen_[index_of(direction)] = true;
+  best_ = Grid::kStart;
+}
+
+/// With one direction only x + sign d is seen; d stays pinned to zero (no cancellation of huge
+/// covariances). The first message of the other direction sets it free:
+/// x = (x + sign d) - sign d.
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::connect_second_direction(Direction direction) noexcept {
+  const std::size_t side = index_of(direction);
+  if (seen_[side]) return;
+  seen_[side] = true;
+  if (known_delay_.known()) return;
+  const double first_sign = -sign_of(side);
+  bank_.for_each([first_sign](Estimate& e) {
+    e.xx += kDelayPrior;
+    e.xd -= first_sign * kDelayPrior;
+    e.dd += kDelayPrior;
+  });
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::rescale_time(double factor) noexcept {
+  bank_.for_each([factor](Estimate& e) {
+    e.y *= factor;
+    e.xy *= factor;
+    e.yd *= factor;
+    e.yy *= factor * factor;
+  });
+  mixed_.y *= factor;
+  mixed_.xy *= factor;
+  mixed_.yd *= factor;
+  mixed_.yy *= factor * factor;
+}
+
+template <class Grid, std::size_t Window>
+double Estimator<Grid, Window>::update(Direction direction, const Observation& seen) noexcept {
+  const std::size_t side = index_of(direction);
+  if (count_ == 0) begin(direction);
+  connect_second_direction(direction);
+  ++count_;
+  ++since_change_;
+  bank_.predict(seen.elapsed);
+  const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
+  bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom, innovations_);
+  bank_.correct(seen, scale_, innovations_);
+
+  const double credit = innovations_.credit[best_];
+  const double innovation = innovations_.centred[best_] + scale_ * shape_[side].tail;
+  const double predicted = innovations_.predicted[best_];
+  gain_ = credit * predicted / (predicted + shape_[side].total_variance());
+  if (count_ > kEvidenceFrom && observable()) gather_evidence();
+  if (count_ > kJudgeFrom) {
+    double& late = late_outliers_[side];
+    late =
+        std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
+    detect_changes();
+  }
+  rejected_[side] = credit < kRejected ? static_cast<std::uint8_t>(rejected_[side] + 1) : 0;
+  if (rejected_[side] >= kRejectedInARow) leave_gate(side, innovation);
+  if (weight_sum_ > 0.0 || count_ > kEvidenceFrom) {
+    const double variance = innovations_.variance[best_] / (scale_ * scale_);
+    residuals_.push(std::abs(innovations_.centred[best_]) / std::sqrt(variance));
+    follow_scale();
+  }
+  if (count_ > kLearnFrom) {
+    const NoiseSample sample{innovation, predicted, robust_scale_, since_change_ > 8};
+    if (learner_[side].learn(sample, shape_[side])) {
+      const auto taken = static_cast<std::uint32_t>(learner_[side].count());
+      const std::size_t other = 1 - side;
+      const bool all_mature =
+          learner_[side].mature() && (!seen_[other] || learner_[other].mature());
+      if (all_mature && taken % 16 == 0) adopt_shapes();
+    }
+  }
+  choose();
+  mix();
+  return credit;
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::gather_evidence() noexcept {
+  const double s2 = scale_ * scale_;
+  for (std::size_t i = 0; i < kSize; ++i) {
+    const double variance = innovations_.variance[i];
+    const double centred = innovations_.centred[i];
+    const double credit = innovations_.credit[i];
+    squares_[i] += credit * std::min(centred * centred / variance, kEvidenceLimit) * s2;
+    logs_[i] += credit * std::log(variance / s2);
+  }
+  weight_sum_ += innovations_.credit[best_];
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::forget_evidence() noexcept {
+  weight_sum_ = 0.0;
+  squares_.fill(0.0);
+  logs_.fill(0.0);
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::detect_changes() noexcept {
+  detector_.add(innovations_.log_density);
+  std::array<std::size_t, kCalm> source{};
+  bool any = false;
+  for (std::size_t i = 0; i < kCalm; ++i) {
+    source[i] = detector_.take_over(i, static_cast<double>(count_));
+    any = any || source[i] != ChangeDetector<Grid>::kNone;
+  }
+  if (!any) return;
+  // From calm to wild: every source stands behind its target and still has its own state.
+  for (std::size_t i = 0; i < kCalm; ++i) {
+    if (source[i] == ChangeDetector<Grid>::kNone) continue;
+    bank_.set(i, bank_.estimate(source[i]));
+    if (i != best_) continue;
+    since_change_ = 0;
+    if (count_ < kYoung) {  // a bad start must leave no trace
+      for (auto& learner : learner_) learner.restart();
+      residuals_.clear();
+      forget_evidence();
+    }
+  }
+}
+
+/// Ten messages of one direction in a row cannot all be outliers: the gate opens.
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::leave_gate(std::size_t side, double innovation) noexcept {
+  rejected_[side] = 0;
+  const double doubt = innovation * innovation / (scale_ * scale_);
+  const bool delay_free = two_way() && !known_delay_.known();
+  bank_.for_each([doubt, delay_free](Estimate& e) {
+    e.xx += doubt;
+    if (delay_free) e.dd += doubt;
+  });
+}
+
+/// c_i = W ln(V_i / W) + L_i: minus twice the log-likelihood with the scale profiled out.
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::choose() noexcept {
+  if (count_ <= kMixFrom || weight_sum_ <= 0.0) {
+    weight_.fill(0.0);
+    best_ = Grid::kStart;
+    weight_[best_] = 1.0;
+    return;
+  }
+  typename Bank::Row cost{};
+  for (std::size_t i = 0; i < kSize; ++i) {
+    cost[i] = weight_sum_ * std::log(std::max(squares_[i] / weight_sum_, 1e-300)) + logs_[i];
+  }
+  best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
+  double total = 0.0;
+  for (std::size_t i = 0; i < kSize; ++i) {
+    weight_[i] = std::exp(-0.5 * (cost[i] - cost[best_]));
+    total += weight_[i];
+  }
+  for (double& weight : weight_) weight /= total;
+  if (weight_sum_ > kEvidenceMemory) {
+    const double keep = kEvidenceMemory / weight_sum_;
+    weight_sum_ = kEvidenceMemory;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      squares_[i] *= keep;
+      logs_[i] *= keep;
+    }
+  }
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::mix() noexcept {
+  mixed_ = bank_.mixture(weight_, scale_);
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::follow_scale() noexcept {
+  robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
+  if (weight_sum_ > 4.0 && squares_[best_] / weight_sum_ > 9.0 * robust_scale_ * robust_scale_) {
+    forget_evidence();
+  }
+  // Fourth root of both directions' variances: the scale is their geometric mean.
+  double learnt = 1.0;
+  double assumed = 1.0;
+  int sides = 0;
+  bool mature = true;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    ++sides;
+    mature = mature && learner_[side].mature();
+    learnt *= learner_[side].variance();
+    assumed *= shape_[side].total_variance();
+  }
+  scale_ = robust_scale_;
+  if (!mature) return;
+  const double wanted = std::pow(learnt / assumed, 0.5 / sides);
+  scale_ = std::clamp(wanted, 0.6 * robust_scale_, 1.8 * robust_scale_);
+}
+
+/// Brings the learnt shapes into use. When a tail appears or goes, the zero of the delay moves from
+/// the mean to the floor or back by `shift`; half of it was offset, half path delay, known to
+/// about 30 per cent.
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::adopt_shapes() noexcept {
+  double product = 1.0;
+  int sides = 0;
+  std::array<DelayShape, 2> in_ns{};
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    ++sides;
+    const double old_tail = scale_ * shape_[side].tail;
+    in_ns[side] = learner_[side].decide();
+    product *= std::max(in_ns[side].total_variance(), kSmallestScale * kSmallestScale);
+    const bool switched = (old_tail > 0.0) != (in_ns[side].tail > 0.0);
+    if (!switched) continue;
+    const double shift = in_ns[side].tail - old_tail;
+    const double sign = sign_of(side);
+    const bool delay_free = two_way() && !known_delay_.known();
+    const double doubt = 0.09 * shift * shift / (scale_ * scale_) / (delay_free ? 4.0 : 1.0);
+    bank_.for_each([=](Estimate& e) {
+      if (delay_free) {
+        e.d -= shift / 2.0;
+        e.x -= sign * shift / 2.0;
+        e.dd += doubt;
+        e.xd += sign * doubt;
+      } else {
+        e.x -= sign * shift;
+      }
+      e.xx += doubt;
+    });
+    learner_[side].move_mean(shift);
+  }
+  scale_ = std::pow(product, 0.25 * (sides == 1 ? 2.0 : 1.0));
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};
+  }
+}
+
+template <class Grid, std::size_t Window>
+double Estimator<Grid, Window>::noise_ns(Direction direction) const noexcept {
+  return scale_ * std::sqrt(shape_[index_of(direction)].total_variance());
+}
+
+template class Estimator<FullGrid, 32>;
+
+}  // namespace ftcs::adaptive

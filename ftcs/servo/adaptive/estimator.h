@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/servo/adaptive/change_detector.h"
+#include "ftcs/servo/adaptive/delay_shape.h"
+#include "ftcs/servo/adaptive/model_bank.h"
+#include "ftcs/servo/adaptive/noise_learner.h"
+#include "ftcs/servo/adaptive/sorted_window.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs::adaptive {
+
+/// A path delay that is known otherwise (peer delay, wiring). Unknown: sigma_ns is negative.
+struct KnownDelay {
+  double mean_ns = 0.0;
+  double sigma_ns = -1.0;
+  [[nodiscard]] bool known() const noexcept { return sigma_ns >= 0.0; }
+};
+
+/// Joint estimate of offset, rate and path delay of the free-running clock against the reference:
+/// the bank, its evidence, what is learnt about noise, and the detection of changes.
+template <class Grid, std::size_t Window>
+class Estimator {
+ public:
+  explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
+
+  /// Returns the probability that the message is no outlier.
+  double update(Direction direction, const Observation& seen) noexcept;
+
+  /// At the event of the last message; covariances in units of scale().
+  [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
+  [[nodiscard]] double scale() const noexcept { return scale_; }
+  /// Noise of one timestamp of the given direction, ns.
+  [[nodiscard]] double noise_ns(Direction direction) const noexcept;
+  [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  /// Gain of the last raw innovation on the offset: the effective p.
+  [[nodiscard]] double gain() const noexcept { return gain_; }
+  /// The unit of time becomes `factor` times as long.
+  void rescale_time(double factor) noexcept;
+
+ private:
+  using Bank = ModelBank<Grid>;
+  static constexpr std::size_t kSize = Grid::kSize;
+  static constexpr std::size_t kCalm = kSize - Grid::kJumps;
+
+  void begin(Direction direction) noexcept;
+  void connect_second_direction(Direction direction) noexcept;
+  void gather_evidence() noexcept;
+  void detect_changes() noexcept;
+  void leave_gate(std::size_t side, double innovation) noexcept;
+  void choose() noexcept;
+  void mix() noexcept;
+  void follow_scale() noexcept;
+  void learn_noise(std::size_t side, double innovation) noexcept;
+  void adopt_shapes() noexcept;
+  void forget_evidence() noexcept;
+  [[nodiscard]] bool observable() const noexcept;
+
+  KnownDelay known_delay_{};
+  Bank bank_{};
+  typename Bank::Innovations innovations_{};
+  ChangeDetector<Grid> detector_{};
+  std::array<NoiseLearner<Window>, 2> learner_{};
+  std::array<DelayShape, 2> shape_{};
+  std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};
+  std::array<bool, 2> seen_{};
+  std::array<std::uint8_t, 2> rejected_{};
+  SortedWindow<Window> residuals_{};
+
+  typename Bank::Row squares_{};  ///< V: credited normalised squares, ns^2
+  typename Bank::Row logs_{};     ///< L: credited ln of normalised variance
+  double weight_sum_ = 0.0;       ///< W: credited messages
+  typename Bank::Row weight_{};
+  std::size_t best_ = Grid::kStart;
+  std::uint32_t count_ = 0;
+  std::uint32_t since_change_ = 0;
+  double scale_ = 100.0;
+  double robust_scale_ = 100.0;
+  double gain_ = 1.0;
+  Estimate mixed_{};
+
+  static constexpr double kOutlierStart = 0.03;
+};
+
+}  // namespace ftcs::adaptive

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "ftcs/servo/adaptive/delay_shape.h"
+#include "ftcs/servo/adaptive/noise_model.h"
+
+namespace ftcs::adaptive {
+
+/// One timestamp pair as the filters see it: z = free running - reference - base, in ns.
+struct Observation {
+  double sign = 1.0;     ///< +1 forward, -1 backward
+  double elapsed = 0.0;  ///< cycles since the previous event; negative if it happened earlier
+  double z = 0.0;        ///< = x + sign (d + n): x offset at the event, d path delay, n delay noise
+};
+
+/// Mean and covariance of one filter: offset x (ns), its drift y (ns per cycle), path delay d (ns);
+/// covariances in units of s^2.
+struct Estimate {
+  double x = 0.0, y = 0.0, d = 0.0;
+  double xx = 0.0, xy = 0.0, xd = 0.0, yy = 0.0, yd = 0.0, dd = 0.0;
+};
+
+/// Outlier hypothesis of one direction: probability of a late and of an early outlier.
+struct OutlierPrior {
+  double late = 0.0;
+  double early = 0.0;
+};
+
+/// Kalman filters of the same three states under different noise models, all fed with the same
+/// observations; steering never enters them. With h = (1, 0, sign):
+///
+///     x += y dt;  P = F P F' + Q(a, b, dt)
+///     nu = sign (z - h state),  S = s^2 (h P h' + v)       nu > 0: the packet is late
+///     state += P h' sign slope(nu) s^2;  P -= P h' h P curvature(nu) s^2
+///
+/// slope and curvature are those of the delay noise (delay_shape.h), damped by `credit`, the
+/// probability that the packet is no outlier.
+template <class Grid>
+class ModelBank {
+ public:
+  static constexpr std::size_t kSize = Grid::kSize;
+  using Row = std::array<double, kSize>;
+
+  /// What one observation says about every model.
+  struct Innovations {
+    Row centred;      ///< nu less the mean delay noise, ns
+    Row variance;     ///< its predicted variance, ns^2
+    Row predicted;    ///< h P h', units of s^2
+    Row log_density;  ///< outliers included
+    Row credit;       ///< probability that the packet is no outlier
+    Row slope;
+    Row curvature;
+  };
+
+  void start(const Estimate& estimate) noexcept {
+    x_.fill(estimate.x);
+    y_.fill(estimate.y);
+    d_.fill(estimate.d);
+    xx_.fill(estimate.xx);
+    xy_.fill(estimate.xy);
+    xd_.fill(estimate.xd);
+    yy_.fill(estimate.yy);
+    yd_.fill(estimate.yd);
+    dd_.fill(estimate.dd);
+  }
+
+  void predict(double elapsed) noexcept {
+    const double t = elapsed;
+    const double span = std::abs(elapsed);
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const NoiseModel& model = Grid::kModels[i];
+      x_[i] += y_[i] * t;
+      xx_[i] += 2.0 * t * xy_[i] + t * t * yy_[i] + model.white_fm * span +
+                model.random_walk_fm * span * span * span / 3.0;
+      xy_[i] += t * yy_[i] + model.random_walk_fm * t * span / 2.0;
+      xd_[i] += t * yd_[i];
+      yy_[i] += model.random_walk_fm * span;
+      dd_[i] += (kDelayWalk + model.delay_walk) * span;
+    }
+  }
+
+  void judge(const Observation& seen, const DelayShape& shape, double scale,
+             const OutlierPrior& outliers, bool gate, Innovations& out) const noexcept {
+    const double s2 = scale * scale;
+    const double tail = scale * shape.tail;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double nu = seen.sign * (seen.z - x_[i]) - d_[i];
+      const double predicted = xx_[i] + 2.0 * seen.sign * xd_[i] + dd_[i];
+      const double spread = s2 * (predicted + shape.variance);
+      const double variance = spread + tail * tail;
+      const double centred = nu - tail;
+      Score score = tail > 0.0 ? late_score(nu, spread, tail) : normal_score(nu, spread);
+      double credit = 1.0;
+      if (gate && centred * centred > kSuspicious * variance) {
+        const double probability = centred > 0.0 ? outliers.late : outliers.early;
+        const double outlier =
+            probability / (10.0 * std::max(std::abs(centred), 3.0 * std::sqrt(variance)));
+        const double density = std::exp(score.log_density);
+        credit = density / (density + outlier);
+        score.log_density = std::log(density + outlier);
+      }
+      out.centred[i] = centred;
+      out.variance[i] = variance;
+      out.predicted[i] = predicted;
+      out.log_density[i] = score.log_density;
+      out.credit[i] = credit;
+      out.slope[i] = score.slope * credit;
+      out.curvature[i] = score.curvature * credit;
+    }
+  }
+
+  void correct(const Observation& seen, double scale, const Innovations& innovations) noexcept {
+    const double s2 = scale * scale;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double hx = xx_[i] + seen.sign * xd_[i];
+      const double hy = xy_[i] + seen.sign * yd_[i];
+      const double hd = xd_[i] + seen.sign * dd_[i];
+      const double move = seen.sign * innovations.slope[i] * s2;
+      const double shrink = innovations.curvature[i] * s2;
+      x_[i] += hx * move;
+      y_[i] += hy * move;
+      d_[i] += hd * move;
+      xx_[i] -= hx * hx * shrink;
+      xy_[i] -= hx * hy * shrink;
+      xd_[i] -= hx * hd * shrink;
+      yy_[i] -= hy * hy * shrink;
+      yd_[i] -= hy * hd * shrink;
+      dd_[i] -= hd * hd * shrink;
+    }
+  }
+
+  [[nodiscard]] Estimate estimate(std::size_t i) const noexcept {
+    return {x_[i], y_[i], d_[i], xx_[i], xy_[i], xd_[i], yy_[i], yd_[i], dd_[i]};
+  }
+  void set(std::size_t i, const Estimate& e) noexcept {
+    x_[i] = e.x;
+    y_[i] = e.y;
+    d_[i] = e.d;
+    xx_[i] = e.xx;
+    xy_[i] = e.xy;
+    xd_[i] = e.xd;
+    yy_[i] = e.yy;
+    yd_[i] = e.yd;
+    dd_[i] = e.dd;
+  }
+  /// The same change to every model.
+  template <class Change>
+  void for_each(Change change) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      Estimate e = estimate(i);
+      change(e);
+      set(i, e);
+    }
+  }
+
+  /// Mean of all models under the given weights (sum one), and the covariance of that mixture
+  /// (between-model spread included; ns^2 of it brought to units of s^2).
+  [[nodiscard]] Estimate mixture(const Row& weight, double scale) const noexcept {
+    Estimate mean;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      mean.x += weight[i] * x_[i];
+      mean.y += weight[i] * y_[i];
+      mean.d += weight[i] * d_[i];
+    }
+    const double per_s2 = 1.0 / (scale * scale);
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double w = weight[i];
+      const double dx = x_[i] - mean.x;
+      const double dy = y_[i] - mean.y;
+      const double dd = d_[i] - mean.d;
+      mean.xx += w * (xx_[i] + dx * dx * per_s2);
+      mean.xy += w * (xy_[i] + dx * dy * per_s2);
+      mean.xd += w * (xd_[i] + dx * dd * per_s2);
+      mean.yy += w * (yy_[i] + dy * dy * per_s2);
+      mean.yd += w * (yd_[i] + dy * dd * per_s2);
+      mean.dd += w * (dd_[i] + dd * dd * per_s2);
+    }
+    return mean;
+  }
+
+ private:
+  /// Even the calmest path changes in the end; keeps the covariance of d from collapsing.
+  static constexpr double kDelayWalk = 1e-9;
+  /// Two sigma: below it the outlier hypothesis cannot win, so its density is not worth computing.
+  static constexpr double kSuspicious = 4.0;
+
+  Row x_{}, y_{}, d_{}, xx_{}, xy_{}, xd_{}, yy_{}, yd_{}, dd_{};
+};
+
+}  // namespace ftcs::adaptive

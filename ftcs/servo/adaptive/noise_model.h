@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace ftcs::adaptive {
+
+/// One hypothesis of how clock and path wander. Dimensionless: variances in units of s^2 (s = noise
+/// of one timestamp), time in cycles (one sync interval).
+struct NoiseModel {
+  double white_fm = 0.0;        ///< a: variance added to the offset per cycle
+  double random_walk_fm = 0.0;  ///< b: variance added to the rate (per cycle) per cycle
+  double delay_walk = 0.0;      ///< variance added to the path delay per cycle
+};
+
+/// The full bank, ordered from calm to wild: a model may take over the state of any model behind
+/// it. Random-walk FM by decades: the gain of a filter goes with b^(1/4), so that half a decade off
+/// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
+/// a^(1/2). The last three are jumps: of the offset by some and by many sigma, of the path delay.
+struct FullGrid {
+  static constexpr std::size_t kSize = 23;
+  static constexpr std::size_t kJumps = 3;
+  static constexpr std::size_t kStart = 10;  ///< the model that is believed before any evidence
+  static constexpr std::array<NoiseModel, kSize> kModels = {{
+      {0.0, 0.0, 0.0},   {0.0, 1e-14, 0.0}, {0.0, 1e-13, 0.0}, {0.0, 1e-12, 0.0}, {0.0, 1e-11, 0.0},
+      {0.0, 1e-10, 0.0}, {0.0, 1e-9, 0.0},  {0.0, 1e-8, 0.0},  {0.0, 1e-7, 0.0},  {0.0, 1e-6, 0.0},
+      {0.0, 1e-5, 0.0},  {0.0, 1e-4, 0.0},  {0.0, 1e-3, 0.0},  {0.0, 1e-2, 0.0},  {0.0, 1e-1, 0.0},
+      {0.0, 1e0, 0.0},   {0.0, 1e1, 0.0},   {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},   {0.0, 1e4, 0.0},
+      {1e2, 0.0, 0.0},   {1e5, 0.0, 0.0},   {0.0, 0.0, 1e5},
+  }};
+};
+
+}  // namespace ftcs::adaptive
