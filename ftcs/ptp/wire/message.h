@@ -39,6 +39,7 @@ inline constexpr std::uint16_t kUtcOffsetValid = 0x0004;
 inline constexpr std::uint16_t kPtpTimescale = 0x0008;
 inline constexpr std::uint16_t kTimeTraceable = 0x0010;
 inline constexpr std::uint16_t kFrequencyTraceable = 0x0020;
+inline constexpr std::uint16_t kSynchronizationUncertain = 0x0040;
 }  // namespace flag
 
 /// logMessageInterval of messages that have none, and of unicast messages (13.3.2.14, Table 42).

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: MIT
+//
+// The world: a transmitter whose clock is the reference, and whose timers run on a free-running
+// clock that began at zero.
+#include "ftcs/ptp/time_transmitter.h"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs::ptp {
+namespace {
+using namespace std::chrono_literals;
+
+const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 0xA}), 1};
+const PortIdentity kReceiver{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
+
+FreeRunningTime raw(Nanoseconds time) { return FreeRunningTime{Duration{time}}; }
+ReferenceTime reference(Nanoseconds time) { return ReferenceTime{Duration{time + 1'800'000'000s}}; }
+
+struct Sent {
+  SendMessage how;
+  Message message;
+};
+
+std::vector<Sent> sent(const ActionList& actions) {
+  std::vector<Sent> all;
+  for (const Action& action : actions) {
+    if (const auto* send = std::get_if<SendMessage>(&action)) {
+      const auto message = decode(send->bytes.view());
+      EXPECT_TRUE(message.ok());
+      EXPECT_EQ(type_of(message->body), send->type);
+      EXPECT_EQ(message->header.sequence_id, send->sequence_id);
+      all.push_back({*send, *message});
+    }
+  }
+  return all;
+}
+
+class Transmitter : public testing::Test {
+ protected:
+  explicit Transmitter(const TimeTransmitterConfig& config = default_config())
+      : transmitter_(config) {
+    static_cast<void>(transmitter_.start(raw(0s)));
+  }
+  static TimeTransmitterConfig default_config() {
+    TimeTransmitterConfig config;
+    config.port = kUs;
+    config.domain = 3;
+    config.log_announce_interval = 0;
+    config.log_sync_interval = -3;
+    config.log_min_delay_req_interval = -2;
+    config.priority1 = 10;
+    config.priority2 = 20;
+    config.quality = {6, 0x21, 0x4E5D};
+    config.announce_flags = flag::kPtpTimescale | flag::kUtcOffsetValid;
+    return config;
+  }
+  static MessageBytes delay_req(std::uint16_t flags = 0) {
+    Message message;
+    message.header.domain = 3;
+    message.header.flags = flags;
+    message.header.source = kReceiver;
+    message.header.sequence_id = 77;
+    message.header.correction = Duration::from_ns(12.5);
+    message.body = DelayReq{};
+    return *encode(message);
+  }
+  [[nodiscard]] std::uint64_t count(Counter counter) const {
+    return transmitter_.counters()[counter];
+  }
+  TimeTransmitter transmitter_;
+};
+
+TEST_F(Transmitter, becomes_the_transmitter_at_once) {
+  TimeTransmitter transmitter(default_config());
+  EXPECT_EQ(transmitter.state(), PortState::kInitializing);
+  EXPECT_FALSE(transmitter.deadline().has_value());
+  EXPECT_EQ(transmitter.start(raw(1s)).size(), 2U);
+  EXPECT_EQ(to_string(transmitter.state()), "MASTER");
+  EXPECT_EQ(transmitter.deadline(), raw(1s));
+}
+
+TEST_F(Transmitter, announces_itself_as_the_grandmaster) {
+  const auto messages = sent(transmitter_.on_timer(raw(0s)));
+  ASSERT_EQ(messages.size(), 2U);
+  const auto& header = messages[0].message.header;
+  const auto* announce = std::get_if<Announce>(&messages[0].message.body);
+  ASSERT_NE(announce, nullptr);
+  EXPECT_EQ(messages[0].how.channel, Channel::kGeneral);
+  EXPECT_EQ(messages[0].how.destination, Destination::kMulticast);
+  EXPECT_EQ(header.domain, 3);
+  EXPECT_EQ(header.source, kUs);
+  EXPECT_EQ(header.log_interval, 0);
+  EXPECT_EQ(header.flags, flag::kPtpTimescale | flag::kUtcOffsetValid);
+  EXPECT_EQ(announce->grandmaster, kUs.clock);
+  EXPECT_EQ(announce->priority1, 10);
+  EXPECT_EQ(announce->priority2, 20);
+  EXPECT_EQ(announce->quality, (ClockQuality{6, 0x21, 0x4E5D}));
+  EXPECT_EQ(announce->utc_offset, 37);
+  EXPECT_EQ(announce->steps_removed, 0);
+}
+
+TEST_F(Transmitter, keeps_its_schedule) {
+  int announces = 0;
+  int syncs = 0;
+  for (FreeRunningTime now = raw(0s); now < raw(8s); now = *transmitter_.deadline()) {
+    for (const auto& one : sent(transmitter_.on_timer(now))) {
+      announces += one.how.type == MessageType::kAnnounce ? 1 : 0;
+      syncs += one.how.type == MessageType::kSync ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(announces, 8);
+  EXPECT_EQ(syncs, 64);
+}
+
+TEST_F(Transmitter, sends_no_burst_after_it_has_slept) {
+  static_cast<void>(transmitter_.on_timer(raw(0s)));
+  EXPECT_EQ(sent(transmitter_.on_timer(raw(60s))).size(), 2U);
+  EXPECT_TRUE(transmitter_.on_timer(raw(60s)).empty());
+  EXPECT_GT(*transmitter_.deadline(), raw(60s));
+}
+
+TEST_F(Transmitter, follow_up_carries_the_transmit_stamp_to_the_last_fraction) {
+  const auto sync = sent(transmitter_.on_timer(raw(0s)))[1];
+  EXPECT_EQ(sync.how.channel, Channel::kEvent);
+  EXPECT_TRUE(sync.message.header.has(flag::kTwoStep));
+  EXPECT_EQ(sync.message.header.log_interval, -3);
+  const auto stamp = reference(1s) + Duration::from_ns(0.75);
+  const auto follow =
+      sent(transmitter_.on_transmit_timestamp(sync.how.sequence_id, stamp, raw(1s)));
+  ASSERT_EQ(follow.size(), 1U);
+  EXPECT_EQ(follow[0].how.channel, Channel::kGeneral);
+  EXPECT_EQ(follow[0].message.header.sequence_id, sync.how.sequence_id);
+  EXPECT_EQ(std::get<FollowUp>(follow[0].message.body).precise_origin, reference(1s));
+  EXPECT_EQ(follow[0].message.header.correction, Duration::from_ns(0.75));
+}
+
+TEST_F(Transmitter, without_a_stamp_no_follow_up_is_sent) {
+  const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
+  EXPECT_TRUE(transmitter_.on_transmit_timestamp_missing(id, raw(0s)).empty());
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+  EXPECT_TRUE(transmitter_.on_transmit_timestamp(id, reference(0s), raw(0s)).empty());
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
+  EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
+}
+
+TEST_F(Transmitter, a_stamp_that_never_comes_is_counted_when_its_place_is_needed) {
+  for (int i = 0; i < 5; ++i) static_cast<void>(transmitter_.on_timer(*transmitter_.deadline()));
+  EXPECT_EQ(count(Counter::kSyncSent), 5U);
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+}
+
+TEST_F(Transmitter, a_stamp_before_the_epoch_is_not_sent) {
+  const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
+  EXPECT_TRUE(transmitter_.on_transmit_timestamp(id, ReferenceTime::from_ns(-1), raw(0s)).empty());
+  EXPECT_EQ(count(Counter::kUnusableTime), 1U);
+}
+
+TEST_F(Transmitter, answers_a_delay_request_with_its_receive_stamp) {
+  const auto received = reference(2s) + Duration::from_ns(0.25);
+  const auto answers = sent(transmitter_.on_event_message(delay_req().view(), received, raw(2s)));
+  ASSERT_EQ(answers.size(), 1U);
+  const auto& header = answers[0].message.header;
+  const auto& response = std::get<DelayResp>(answers[0].message.body);
+  EXPECT_EQ(answers[0].how.channel, Channel::kGeneral);
+  EXPECT_EQ(answers[0].how.destination, Destination::kMulticast);
+  EXPECT_EQ(header.sequence_id, 77);
+  EXPECT_EQ(header.log_interval, -2);
+  EXPECT_EQ(response.requesting_port, kReceiver);
+  EXPECT_EQ(response.receive, reference(2s));
+  // Receivers take t4 - correction: request's correction away, fraction of the stamp back in.
+  EXPECT_EQ(response.receive - header.correction, received - Duration::from_ns(12.5));
+}
+
+TEST_F(Transmitter, answers_by_unicast_who_asks_by_unicast) {
+  const auto answers =
+      sent(transmitter_.on_event_message(delay_req(flag::kUnicast).view(), reference(2s), raw(2s)));
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].how.destination, Destination::kSender);
+  EXPECT_TRUE(answers[0].message.header.has(flag::kUnicast));
+  EXPECT_EQ(answers[0].message.header.log_interval, kNoLogInterval);
+}
+
+class UnicastTransmitter : public Transmitter {
+ protected:
+  UnicastTransmitter() : Transmitter(config()) {}
+  static TimeTransmitterConfig config() {
+    auto config = default_config();
+    config.unicast = true;
+    return config;
+  }
+};
+
+TEST_F(UnicastTransmitter, sends_to_its_one_peer) {
+  auto messages = sent(transmitter_.on_timer(raw(0s)));
+  const auto follow = sent(
+      transmitter_.on_transmit_timestamp(messages.at(1).how.sequence_id, reference(0s), raw(0s)));
+  messages.insert(messages.end(), follow.begin(), follow.end());
+  ASSERT_EQ(messages.size(), 3U);
+  for (const auto& one : messages) {
+    EXPECT_EQ(one.how.destination, Destination::kPeer);
+    EXPECT_TRUE(one.message.header.has(flag::kUnicast));
+    EXPECT_EQ(one.message.header.log_interval, kNoLogInterval);
+  }
+}
+
+TEST_F(Transmitter, leaves_alone_what_is_not_for_it) {
+  const auto receive = [&](const PortIdentity& source, std::uint8_t domain, const Body& body) {
+    Message message;
+    message.header.domain = domain;
+    message.header.source = source;
+    message.body = body;
+    return transmitter_.on_event_message(encode(message)->view(), reference(0s), raw(0s));
+  };
+  EXPECT_TRUE(receive(kReceiver, 0, DelayReq{}).empty());
+  EXPECT_TRUE(receive(kUs, 3, Sync{}).empty());
+  EXPECT_TRUE(receive(kReceiver, 3, Announce{}).empty());
+  EXPECT_TRUE(receive(kReceiver, 3, PdelayReq{}).empty());
+  EXPECT_TRUE(receive(kReceiver, 3, Management{}).empty());
+  EXPECT_TRUE(receive(kReceiver, 3, Signaling{}).empty());
+  EXPECT_TRUE(transmitter_.on_general_message(delay_req().view(), raw(0s)).empty());
+  EXPECT_TRUE(transmitter_.on_general_message({}, raw(0s)).empty());
+  for (const auto counter :
+       {Counter::kWrongDomain, Counter::kOwnMessage, Counter::kNotForThisRole,
+        Counter::kPdelayIgnored, Counter::kManagementIgnored, Counter::kSignalingIgnored,
+        Counter::kWrongChannel, Counter::kTruncated}) {
+    EXPECT_EQ(count(counter), 1U) << to_string(counter);
+  }
+  EXPECT_EQ(count(Counter::kDelayRespSent), 0U);
+}
+
+TEST_F(Transmitter, while_the_link_is_down_it_is_silent) {
+  static_cast<void>(transmitter_.on_link_down(raw(1s)));
+  EXPECT_EQ(transmitter_.state(), PortState::kFaulty);
+  EXPECT_FALSE(transmitter_.deadline().has_value());
+  EXPECT_TRUE(transmitter_.on_timer(raw(2s)).empty());
+  EXPECT_TRUE(transmitter_.on_event_message(delay_req().view(), reference(2s), raw(2s)).empty());
+  EXPECT_EQ(count(Counter::kNotListening), 1U);
+  static_cast<void>(transmitter_.on_link_up(raw(3s)));
+  EXPECT_EQ(sent(transmitter_.on_timer(raw(3s))).size(), 2U);
+}
+
+TEST_F(Transmitter, allocates_nothing) {
+  const auto request = delay_req();
+  std::size_t actions = 0;
+  {
+    const test::ForbidAllocation guard;
+    actions += transmitter_.on_timer(raw(0s)).size();
+    actions += transmitter_.on_transmit_timestamp(0, reference(0s), raw(0s)).size();
+    actions += transmitter_.on_event_message(request.view(), reference(0s), raw(0s)).size();
+  }
+  EXPECT_EQ(actions, 4U);
+}
+
+}  // namespace
+}  // namespace ftcs::ptp
