@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/live_view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace ftcs {
+namespace {
+
+constexpr std::size_t kPlotWidth = 40;
+
+std::string_view state_name(const Telemetry& telemetry) {
+  switch (telemetry.servo.state) {
+    case ServoState::kUnlocked: return "unlocked";
+    case ServoState::kJump: return "jump";
+    case ServoState::kLocked: return telemetry.locked ? "locked" : "steering";
+    case ServoState::kHoldover: return "holdover";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string offset_plot(std::span<const double> offsets_ns, std::size_t width) {
+  constexpr std::array<std::string_view, 8> kHeights{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  constexpr double kLowestDecade = 1.0;    // 10 ns
+  constexpr double kDecades = 6.0 - kLowestDecade;  // up to 1 ms
+  std::string plot;
+  const std::size_t shown = std::min(width, offsets_ns.size());
+  plot.append(width - shown, ' ');
+  for (const double offset : offsets_ns.last(shown)) {
+    const double decade = std::log10(std::max(std::abs(offset), 1.0));
+    const double height = (decade - kLowestDecade) / kDecades * (kHeights.size() - 1);
+    plot += kHeights[static_cast<std::size_t>(std::clamp(height, 0.0, 7.0))];
+  }
+  return plot;
+}
+
+std::string format_time(double ns) {
+  const double magnitude = std::abs(ns);
+  if (!(magnitude < 1e9)) return fmt::format("{:.3f} s", ns * 1e-9);
+  if (magnitude >= 1e6) return fmt::format("{:.3f} ms", ns * 1e-6);
+  if (magnitude >= 1e3) return fmt::format("{:.3f} us", ns * 1e-3);
+  return fmt::format("{:.0f} ns", ns);
+}
+
+void LiveView::draw(std::span<const ServoTrial* const> trials, double elapsed_seconds,
+                    double total_seconds) {
+  if (!enabled_) return;
+  std::string screen;
+  if (drawn_lines_ > 0) screen += fmt::format("\x1b[{}A", drawn_lines_);
+  screen += fmt::format("\x1b[2K{:5.1f} of {:.0f} s   true offset     offset it sees        rate   state     "
+                        "|true offset|, 10 ns to 1 ms\n",
+                        elapsed_seconds, total_seconds);
+  for (const ServoTrial* trial : trials) {
+    const Telemetry& latest = trial->latest();
+    const auto& truth = trial->true_offsets_ns();
+    screen += fmt::format("\x1b[2K{:>13}  {:>13}  {:>13}  {:>10.3f} ppm  {:<8} {}\n", trial->name(),
+                          truth.empty() ? "" : format_time(truth.back()),
+                          format_time(latest.servo.offset.ns()), latest.applied_rate.ppm(),
+                          state_name(latest), offset_plot(truth, kPlotWidth));
+  }
+  drawn_lines_ = trials.size() + 1;
+  std::fputs(screen.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+void LiveView::finish() {
+  if (enabled_ && drawn_lines_ > 0) std::fputs("\n", stdout);
+  drawn_lines_ = 0;
+}
+
+}  // namespace ftcs
