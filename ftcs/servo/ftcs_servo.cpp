@@ -58,6 +58,19 @@ void FtcsServo::reset() noexcept {
   snapshot_.state = ServoState::kUnlocked;
 }
 
+namespace {
+
+/// The correction ends T_c after the *sample* (Fig. 3: local and reference meet at tau_rd(n) +
+/// T_c), however late the command comes. A command that is later than half of T_c would need more
+/// than twice the rate: it takes its half of T_c all the same.
+Duration remaining_time(Duration correction_time, Duration latency) noexcept {
+  const Duration remaining = correction_time - latency;
+  const Duration shortest = correction_time.half();
+  return remaining < shortest ? shortest : remaining;
+}
+
+}  // namespace
+
 double FtcsServo::gain_for(Duration offset) noexcept {
   const bool first_action = state_.phase != Phase::kActing;
   if (first_action && config_.converged_dwell > 0) return 1.0;
@@ -69,15 +82,16 @@ double FtcsServo::gain_for(Duration offset) noexcept {
 ServoCommand FtcsServo::steer(const SyncSample& sample, const ClockReading& now,
                               const SampleProgress& progress) noexcept {
   const Rate tracking = progress.ratio();
-  const ReferenceTime reference_now =
-      sample.reference() + scale(now.free_running - sample.free_running, tracking);
+  const Duration latency = scale(now.free_running - sample.free_running, tracking);
+  const ReferenceTime reference_now = sample.reference() + latency;
   const Duration offset = offset_from_reference(now.local, reference_now);
   const double gain = gain_for(offset);
 
   const Duration sync_interval =
       config_.sync_interval > Nanoseconds{0} ? Duration{config_.sync_interval} : progress.reference;
-  const Duration correction_time =
+  const Duration wanted_time =
       config_.correction_time > Nanoseconds{0} ? Duration{config_.correction_time} : sync_interval;
+  const Duration correction_time = remaining_time(wanted_time, latency);
   // (1 + p T_offset / T_c) k a with T_offset = -offset   (17), (19)
   const Rate pull = Rate::from_ratio(1.0 - gain * offset.ns() / correction_time.ns());
   snapshot_.rate_ratio = tracking;

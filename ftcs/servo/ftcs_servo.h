@@ -43,8 +43,9 @@ struct FtcsConfig {
 /// k a is formed as reference per *free-running* time: that is k(n) times the mean rate which was
 /// really applied between the samples, whatever was commanded in the meantime. Both ends use one
 /// path delay (eq. 10 with d_rl unchanged), so that it cancels. T_offset = -offset, projected from
-/// the sample to the moment at which the command takes effect; without latency this is the paper to
-/// the letter. The first command comes with the second sample. Never steps.
+/// the sample to the moment at which the command takes effect, and the correction ends T_c after
+/// the sample (Fig. 3), not after the command; without latency this is the paper to the letter. The
+/// first command comes with the second sample. Never steps.
 class FtcsServo {
  public:
   using Config = FtcsConfig;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // World: a million random affine clocks. Oscillators off by up to ±10 %, offsets such that the rate
 // limits do not bind, intervals from 50 us to 16 s (log-uniform), a random latency between sample
-// and command. Noise-free FTCS must be on the reference when its first correction has run out,
-// whatever it may be.
+// and command. Noise-free FTCS must be on the reference one interval after the sample it first acts
+// on, whatever the latency.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -44,8 +44,8 @@ RandomClock draw_clock(Draw& draw) {
   clock.interval = Duration::from_ns(interval_ns);
   clock.latency = Duration::from_ns(std::floor(draw.uniform(0.0, 0.2) * interval_ns));
   clock.skew = draw.uniform(-0.1, 0.1);
-  // ±20 % of the interval: up to seconds, and with the skew's own share inside the default limits.
-  clock.offset_ns = draw.uniform(-0.2, 0.2) * interval_ns;
+  // ±12 % of the interval: up to seconds, and with the skew's own share inside the default limits.
+  clock.offset_ns = draw.uniform(-0.12, 0.12) * interval_ns;
   return clock;
 }
 
@@ -58,8 +58,8 @@ SyncSample in_whole_nanoseconds(SyncSample sample) {
   return sample;
 }
 
-/// Offset after two samples, one command and one correction time, with the stamps that `stamp`
-/// makes of the true times; not a number if there was no command.
+/// Offset one interval after the second sample, with the stamps that `stamp` makes of the true
+/// times; not a number if there was no command.
 template <class Stamp>
 double landing_ns(const RandomClock& clock, AffinePlant plant, Stamp stamp) {
   FtcsConfig config;
@@ -68,11 +68,12 @@ double landing_ns(const RandomClock& clock, AffinePlant plant, Stamp stamp) {
   servo.prime(stamp(plant.sample()));
   plant.advance(clock.interval);
   const SyncSample sample = stamp(plant.sample());
+  const ReferenceTime one_interval_later = plant.reference() + clock.interval;
   plant.advance(clock.latency);
   const ServoUpdate update = servo.update(sample, plant.read());
   if (!update.has_command) return std::nan("");
   plant.apply(update.command);
-  plant.advance_reference(clock.interval);
+  plant.advance_reference(one_interval_later - plant.reference());
   return plant.offset_ns();
 }
 
