@@ -49,7 +49,6 @@ ServoUpdate FtcsServo::update(const SyncSample& sample, const ClockReading& now)
   snapshot_.path_delay = sample.path_delay;
   const ServoCommand command = steer(sample, now, progress);
   state_.previous = sample;
-  state_.phase = Phase::kActing;
   return {SampleVerdict::kUsed, true, command};
 }
 
@@ -97,7 +96,11 @@ ServoCommand FtcsServo::steer(const SyncSample& sample, const ClockReading& now,
   snapshot_.rate_ratio = tracking;
   snapshot_.offset_gain = gain;
   ServoCommand command;
-  command.correction_rate = config_.limits.clamp(pull * tracking);
+  const Rate wanted = pull * tracking;
+  command.correction_rate = config_.limits.clamp(wanted);
+  // As long as F cuts eq. 18 short, the offset it was to remove is still there: the first action
+  // goes on.
+  if (command.correction_rate == wanted) state_.phase = Phase::kActing;
   command.correction_time = correction_time;
   command.tracking_rate = config_.limits.clamp(tracking);
   return command;

@@ -223,6 +223,25 @@ TEST(FtcsServo, limits_hold_for_the_correction_and_for_the_tracking_rate) {
   EXPECT_NEAR(servo.snapshot().rate_ratio.ppm(), 1000.0, 1e-6);  // what was measured is not hidden
 }
 
+TEST(FtcsServo, the_first_action_goes_on_until_the_limits_let_it_through) {
+  FtcsConfig config = with_gain(0.25);
+  config.limits = RateLimits::symmetric_ppb(1e6);  // 125 us an interval
+  AffinePlant plant{1.0L, 300us};
+  FtcsServo servo{config};
+  step(servo, plant);
+  for (const double left_ns : {175'000.0, 50'000.0, 0.0}) {
+    plant.advance_reference(kInterval);
+    step(servo, plant);
+    EXPECT_EQ(servo.snapshot().offset_gain, 1.0);
+    AffinePlant later = plant;
+    later.advance_reference(kInterval);
+    EXPECT_NEAR(later.offset_ns(), left_ns, 1e-3);
+  }
+  plant.advance_reference(kInterval);
+  step(servo, plant);
+  EXPECT_EQ(servo.snapshot().offset_gain, 0.25);
+}
+
 TEST(FtcsServo, measures_the_interval_when_none_is_configured) {
   FtcsServo servo{};
   const SyncSample first = sample_at(0, 0);
