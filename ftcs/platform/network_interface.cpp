@@ -2,6 +2,7 @@
 #include "ftcs/platform/network_interface.h"
 
 #include <algorithm>
+#include <arpa/inet.h>
 #include <cerrno>
 #include <cstring>
 #include <linux/ethtool.h>
@@ -9,6 +10,7 @@
 #include <linux/sockios.h>
 #include <net/if.h>
 #include <sys/ioctl.h>
+#include <unistd.h>
 
 namespace ftcs::platform {
 namespace {
@@ -107,6 +109,31 @@ std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const 
     if (result == -EPERM) break;
   }
   return os_error(-result, "hardware time stamping on " + name);
+}
+
+Result<std::array<std::uint8_t, 6>, OsError> identity_address(Kernel& kernel,
+                                                              const std::string& name) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return os_error(-fd, "socket");
+  const Descriptor socket(kernel, fd);
+  const auto capabilities = interface_capabilities(kernel, fd, name);
+  if (!capabilities) return capabilities.error();
+  std::array<std::uint8_t, 6> address = capabilities->mac;
+  if (address == std::array<std::uint8_t, 6>{}) {
+    constexpr std::uint8_t kLocallyAdministered = 0x02;
+    const auto process = static_cast<std::uint32_t>(::getpid());
+    for (std::size_t i = 0; i < sizeof process; ++i) {
+      address[2 + i] = static_cast<std::uint8_t>(process >> (24 - 8 * i));
+    }
+    address[0] = kLocallyAdministered;
+  }
+  return address;
+}
+
+std::optional<in_addr> parse_ipv4(const std::string& text) {
+  in_addr address{};
+  if (::inet_pton(AF_INET, text.c_str(), &address) != 1) return std::nullopt;
+  return address;
 }
 
 }  // namespace ftcs::platform

@@ -43,4 +43,13 @@ struct InterfaceCapabilities {
 [[nodiscard]] std::optional<OsError> enable_hardware_timestamps(
     Kernel& kernel, int fd, const std::string& name, const InterfaceCapabilities& capabilities);
 
+/// A 48-bit address to make a clock identity of: the interface's own or, where it has none
+/// (loopback), a locally administered one of this process, so that two processes on loopback are
+/// two clocks.
+[[nodiscard]] Result<std::array<std::uint8_t, 6>, OsError> identity_address(
+    Kernel& kernel, const std::string& name);
+
+/// Dotted decimal.
+[[nodiscard]] std::optional<in_addr> parse_ipv4(const std::string& text);
+
 }  // namespace ftcs::platform

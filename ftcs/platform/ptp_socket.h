@@ -14,13 +14,12 @@
 #include "ftcs/platform/os_error.h"
 #include "ftcs/platform/timestamp_clock.h"
 #include "ftcs/platform/transmission_log.h"
+#include "ftcs/ptp/actions.h"
 #include "ftcs/time/result.h"
 
 namespace ftcs::platform {
 
-/// IEEE 1588-2019, Annex C.2: event messages (Sync, Delay_Req) have their own UDP port: they are
-/// stamped.
-enum class Channel : std::uint8_t { kEvent, kGeneral };
+using ptp::Channel;
 
 struct PtpSocketConfig {
   std::string interface;

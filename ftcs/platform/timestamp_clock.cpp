@@ -21,7 +21,11 @@ const char* name(StampSource source) noexcept {
 
 TimestampClock::TimestampClock(Kernel& kernel, TimestampMode mode,
                                std::optional<HardwareClock> hardware)
-    : mode_(mode), raw_(kernel), realtime_(kernel), hardware_(std::move(hardware)) {}
+    : kernel_(kernel),
+      mode_(mode),
+      raw_(kernel),
+      realtime_(kernel),
+      hardware_(std::move(hardware)) {}
 
 FreeRunningSource& TimestampClock::source() noexcept {
   if (hardware_) return *hardware_;
@@ -37,6 +41,16 @@ std::optional<Stamp> TimestampClock::convert(const KernelStamps& stamps) noexcep
   const auto mapped = realtime_.map(stamps.software_ns);
   if (!mapped) return std::nullopt;
   return Stamp{*mapped, StampSource::kSoftware};
+}
+
+TimestampClock::RealtimeReading TimestampClock::read_realtime() noexcept {
+  if (!hardware_) {
+    const RealtimeToRaw::Reading reading = realtime_.read();
+    return {FreeRunningTime::from_ns(reading.raw_ns), reading.realtime_ns};
+  }
+  const FreeRunningTime before = hardware_->now();
+  const std::int64_t realtime = kernel_.clock_ns(CLOCK_REALTIME);
+  return {before + (hardware_->now() - before).half(), realtime};
 }
 
 Result<std::unique_ptr<TimestampClock>, OsError> TimestampClock::open(Kernel& kernel,

@@ -57,6 +57,12 @@ class TimestampClock {
   /// A kernel stamp on the free-running clock. No value: the kernel gave none of the kind that we
   /// use, or CLOCK_REALTIME was set since.
   [[nodiscard]] std::optional<Stamp> convert(const KernelStamps& stamps) noexcept;
+  /// CLOCK_REALTIME and the free-running clock at one instant, to set a clock by.
+  struct RealtimeReading {
+    FreeRunningTime free_running;
+    std::int64_t realtime_ns = 0;
+  };
+  [[nodiscard]] RealtimeReading read_realtime() noexcept;
   /// The last resort: read the clock now.
   [[nodiscard]] Stamp user_space_stamp() noexcept {
     return {source().now(), StampSource::kUserSpace};
@@ -64,6 +70,7 @@ class TimestampClock {
   [[nodiscard]] std::uint64_t realtime_steps() const noexcept { return realtime_.steps(); }
 
  private:
+  Kernel& kernel_;
   TimestampMode mode_;
   RawClock raw_;
   RealtimeToRaw realtime_;

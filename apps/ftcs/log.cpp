@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/log.h"
+
+#include <ctime>
+
+namespace ftcs::app {
+
+void Log::write(std::string_view text) {
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  const std::int64_t ms = kernel_.clock_ns(CLOCK_MONOTONIC) / kNsPerMs;
+  fmt::print(stream_, "ftcs[{}.{:03}]: {}\n", ms / 1000, ms % 1000, text);
+  std::fflush(stream_);  // whoever follows a pipe wants each line at once
+}
+
+}  // namespace ftcs::app

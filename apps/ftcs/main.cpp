@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include <exception>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "apps/ftcs/commands.h"
+
+namespace {
+
+int run(int argc, char** argv) {
+  using namespace ftcs::app;
+  CLI::App app{"Clocks that follow other clocks: frequency-tracking clock servos over PTP", "ftcs"};
+  app.set_version_flag("-v,--version", "ftcs " FTCS_VERSION);
+  app.require_subcommand(1);
+  int exit_code = kSuccess;
+  add_ptp_command(app, exit_code);
+  const auto is_command = [&app](const std::string& name) {
+    return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })
+                .empty();
+  };
+  if (argc > 1 && argv[1][0] != '-' && !is_command(argv[1])) {
+    fmt::print(stderr, "ftcs: unknown command '{}' (see ftcs --help)\n", argv[1]);
+    return kUsageError;
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // --help, --version
+    return app.exit(request);
+  } catch (const CLI::Error& error) {
+    fmt::print(stderr, "ftcs: {} (see ftcs --help)\n", error.what());
+    return kUsageError;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "ftcs: {}\n", error.what());
+    return ftcs::app::kRuntimeError;
+  }
+}

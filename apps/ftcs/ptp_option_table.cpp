@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/ptp_option_table.h"
+
+#include <array>
+#include <limits>
+
+#include <fmt/core.h>
+
+#include "apps/ftcs/units.h"
+
+namespace ftcs::app {
+namespace {
+
+using Wrong = std::optional<std::string>;
+
+template <class Target>
+Wrong integer(std::string_view text, Target& target, std::int64_t lowest, std::int64_t highest) {
+  const auto value = parse_integer(text, lowest, highest);
+  if (!value) return value.error().message;
+  target = static_cast<Target>(*value);
+  return std::nullopt;
+}
+
+Wrong nanoseconds(std::string_view text, Nanoseconds& target) {
+  constexpr std::int64_t kLargest = 1'000'000'000;  // a second of cable is no asymmetry
+  std::int64_t value = 0;
+  if (auto wrong = integer(text, value, -kLargest, kLargest)) return wrong;
+  target = Nanoseconds{value};
+  return std::nullopt;
+}
+
+Wrong seconds(std::string_view text, Nanoseconds& target) {
+  const auto value = parse_number(text, 0.0, 1e9);
+  if (!value) return value.error().message;
+  target = Nanoseconds{Duration::from_ns(*value * 1e9).rounded_ns()};
+  return std::nullopt;
+}
+
+Wrong number(std::string_view text, double& target, double lowest = 0.0) {
+  const auto value = parse_number(text, lowest, std::numeric_limits<double>::max());
+  if (!value) return value.error().message;
+  target = *value;
+  return std::nullopt;
+}
+
+Wrong boolean(std::string_view text, bool& target) {
+  if (text != "0" && text != "1") return fmt::format("'{}': expected 0 or 1", text);
+  target = text == "1";
+  return std::nullopt;
+}
+
+Wrong only(std::string_view text, std::string_view supported) {
+  if (text == supported) return std::nullopt;
+  return fmt::format("'{}' is not supported, only {}", text, supported);
+}
+
+Wrong interval(std::string_view text, std::int8_t& target) { return integer(text, target, -7, 7); }
+
+Wrong set_identity(PtpOptions& options, std::string_view text) {
+  std::string digits;
+  for (const char c : text) {
+    if (c != '.' && c != ':') digits.push_back(c);
+  }
+  ptp::ClockIdentity identity;
+  bool valid = digits.size() == 2 * identity.octets.size();
+  for (std::size_t i = 0; valid && i < identity.octets.size(); ++i) {
+    const auto octet = parse_integer("0x" + digits.substr(2 * i, 2), 0, 255);
+    valid = octet.ok();
+    if (valid) identity.octets[i] = static_cast<std::uint8_t>(*octet);
+  }
+  if (!valid) return fmt::format("'{}': expected 001122.fffe.334455", text);
+  if (identity != ptp::ClockIdentity{}) options.clock_identity = identity;  // zero: the default
+  return std::nullopt;
+}
+
+Wrong set_clock_servo(PtpOptions& options, std::string_view text) {
+  if (auto wrong = only(text, "pi")) return *wrong + " (--servo knows more)";
+  options.servo.kind = ServoKind::kLinuxptpPi;
+  return std::nullopt;
+}
+
+Wrong set_delay_filter(PtpOptions& options, std::string_view text) {
+  auto& kind = options.servo.two_way.path_delay.filter.kind;
+  if (text == "moving_median") {
+    kind = DelayFilterKind::kMovingMedian;
+  } else if (text == "moving_minimum") {
+    kind = DelayFilterKind::kMovingMinimum;
+  } else {
+    return fmt::format("'{}' is not supported, only moving_median and moving_minimum", text);
+  }
+  return std::nullopt;
+}
+
+Wrong set_time_stamping(PtpOptions& options, std::string_view text) {
+  if (text == "hardware") {
+    options.timestamps = platform::TimestampMode::kHardware;
+  } else if (text == "software") {
+    options.timestamps = platform::TimestampMode::kSoftware;
+  } else {
+    return fmt::format("'{}' is not supported, only hardware and software", text);
+  }
+  return std::nullopt;
+}
+
+Wrong set_receiver_only(PtpOptions& options, std::string_view text) {
+  bool receiver_only = true;
+  if (auto wrong = boolean(text, receiver_only)) return wrong;
+  if (receiver_only) {
+    options.role = Role::kTimeReceiver;
+  } else if (options.role == Role::kTimeReceiver) {
+    options.notes.emplace_back(
+        "slaveOnly 0: this port keeps the role it was given (--role) and never becomes a time "
+        "transmitter by itself");
+  }
+  return std::nullopt;
+}
+
+Wrong set_transmitter_only(PtpOptions& options, std::string_view text) {
+  bool transmitter_only = false;
+  if (auto wrong = boolean(text, transmitter_only)) return wrong;
+  if (transmitter_only) options.role = Role::kTimeTransmitter;
+  return std::nullopt;
+}
+
+Wrong set_timeout(PtpOptions& options, std::string_view text) {
+  std::int64_t milliseconds = 0;
+  if (auto wrong = integer(text, milliseconds, 1, 10'000)) return wrong;
+  options.socket.tx_timestamp_timeout = std::chrono::milliseconds{milliseconds};
+  return std::nullopt;
+}
+
+Wrong set_max_frequency(PtpOptions& options, std::string_view text) {
+  const auto ppb = parse_number(text, 1.0, 900'000'000.0);
+  if (!ppb) return ppb.error().message;
+  options.servo.limits = RateLimits::symmetric_ppb(*ppb);
+  return std::nullopt;
+}
+
+#define FTCS_SET(expression) [](PtpOptions& o, std::string_view v) -> Wrong { return expression; }
+
+constexpr std::array kSettings{
+    PtpSetting{"domainNumber", "PTP domain, 0 to 255", FTCS_SET(integer(v, o.domain, 0, 255))},
+    PtpSetting{"transportSpecific", "majorSdoId, 0 to 15",
+               FTCS_SET(integer(v, o.major_sdo_id, 0, 15))},
+    PtpSetting{"ptp_minor_version", "0 (IEEE 1588-2008) or 1",
+               FTCS_SET(integer(v, o.minor_version, 0, 1))},
+    PtpSetting{"logAnnounceInterval", "log2 of seconds, -7 to 7",
+               FTCS_SET(interval(v, o.log_announce_interval))},
+    PtpSetting{"logSyncInterval", "log2 of seconds, -7 to 7",
+               FTCS_SET(interval(v, o.log_sync_interval))},
+    PtpSetting{"logMinDelayReqInterval", "log2 of seconds, -7 to 7",
+               FTCS_SET(interval(v, o.log_min_delay_req_interval))},
+    PtpSetting{"announceReceiptTimeout", "announce intervals, 2 to 10",
+               FTCS_SET(integer(v, o.announce_receipt_timeout, 2, 10))},
+    PtpSetting{"priority1", "0 to 255", FTCS_SET(integer(v, o.priority1, 0, 255))},
+    PtpSetting{"priority2", "0 to 255", FTCS_SET(integer(v, o.priority2, 0, 255))},
+    PtpSetting{"clockClass", "0 to 255", FTCS_SET(integer(v, o.quality.clock_class, 0, 255))},
+    PtpSetting{"clockAccuracy", "0x00 to 0xFE",
+               FTCS_SET(integer(v, o.quality.clock_accuracy, 0, 0xFE))},
+    PtpSetting{"offsetScaledLogVariance", "0x0000 to 0xFFFF",
+               FTCS_SET(integer(v, o.quality.offset_scaled_log_variance, 0, 0xFFFF))},
+    PtpSetting{"utc_offset", "TAI - UTC in seconds",
+               FTCS_SET(integer(v, o.utc_offset, -32768, 32767))},
+    PtpSetting{"timeSource", "0x00 to 0xFF", FTCS_SET(integer(v, o.time_source, 0, 0xFF))},
+    PtpSetting{"clockIdentity", "001122.fffe.334455", set_identity},
+    PtpSetting{"slaveOnly", "1: time receiver", set_receiver_only},
+    PtpSetting{"clientOnly", "1: time receiver", set_receiver_only},
+    PtpSetting{"masterOnly", "1: time transmitter", set_transmitter_only},
+    PtpSetting{"serverOnly", "1: time transmitter", set_transmitter_only},
+    PtpSetting{"delayAsymmetry", "ns, positive if the way to the receiver is longer",
+               FTCS_SET(nanoseconds(v, o.delay_asymmetry))},
+    PtpSetting{"egressLatency", "ns, added to transmit timestamps",
+               FTCS_SET(nanoseconds(v, o.egress_latency))},
+    PtpSetting{"ingressLatency", "ns, subtracted from receive timestamps",
+               FTCS_SET(nanoseconds(v, o.ingress_latency))},
+    PtpSetting{"tx_timestamp_timeout", "ms", set_timeout},
+    PtpSetting{"udp_ttl", "1 to 255", FTCS_SET(integer(v, o.socket.ttl, 1, 255))},
+    PtpSetting{"time_stamping", "hardware or software; default: the best available",
+               set_time_stamping},
+    PtpSetting{"network_transport", "UDPv4", FTCS_SET((void(o), only(v, "UDPv4")))},
+    PtpSetting{"delay_mechanism", "E2E", FTCS_SET((void(o), only(v, "E2E")))},
+    PtpSetting{"clock_servo", "pi (as --servo linuxptp-pi)", set_clock_servo},
+    PtpSetting{"free_running", "1: measure, do not steer", FTCS_SET(boolean(v, o.free_running))},
+    PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
+    PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
+    PtpSetting{"max_frequency", "ppb", set_max_frequency},
+    PtpSetting{"delay_filter", "moving_median or moving_minimum", set_delay_filter},
+    PtpSetting{
+        "delay_filter_length", "samples, 1 to 32",
+        FTCS_SET(integer(v, o.servo.two_way.path_delay.filter.length, 1, DelayFilter::kCapacity))},
+    PtpSetting{"pi_proportional_const", "ppb per ns; 0: by scale",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_const))},
+    PtpSetting{"pi_proportional_scale", "0: by time stamping",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_scale))},
+    PtpSetting{"pi_proportional_exponent", "of the sync interval",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_exponent, -1e3))},
+    PtpSetting{"pi_proportional_norm_max", "greatest gain per sample",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_norm_max))},
+    PtpSetting{"pi_integral_const", "ppb per ns; 0: by scale",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_const))},
+    PtpSetting{"pi_integral_scale", "0: by time stamping",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_scale))},
+    PtpSetting{"pi_integral_exponent", "of the sync interval",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_exponent, -1e3))},
+    PtpSetting{"pi_integral_norm_max", "greatest gain per sample",
+               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_norm_max))},
+    PtpSetting{"logging_level", "0 to 7", FTCS_SET(integer(v, o.log_level, 0, 7))},
+    PtpSetting{"summary_interval", "log2 of seconds, -7 to 20",
+               FTCS_SET(integer(v, o.summary_interval, -7, 20))},
+};
+
+#undef FTCS_SET
+
+// What describes this program anyway, so that files written for ptp4l need no editing; kAny: no
+// effect here.
+struct Fixed {
+  const char* name;
+  const char* value;
+};
+constexpr const char* kAny = "*";
+constexpr std::array kFixed{
+    Fixed{"twoStepFlag", "1"},
+    Fixed{"gmCapable", "1"},
+    Fixed{"socket_priority", "0"},
+    Fixed{"freq_est_interval", kAny},  // free_running has no estimator of its own
+    Fixed{"dscp_event", "0"},
+    Fixed{"dscp_general", "0"},
+    Fixed{"dataset_comparison", "ieee1588"},
+    Fixed{"G.8275.defaultDS.localPriority", "128"},
+    Fixed{"G.8275.portDS.localPriority", "128"},
+    Fixed{"maxStepsRemoved", "255"},
+    Fixed{"operLogSyncInterval", kAny},       // automotive profile only
+    Fixed{"operLogPdelayReqInterval", kAny},  // automotive profile only
+    Fixed{"logMinPdelayReqInterval", kAny},   // peer delay only
+    Fixed{"neighborPropDelayThresh", kAny},   // peer delay only
+    Fixed{"min_neighbor_prop_delay", kAny},   // peer delay only
+    Fixed{"syncReceiptTimeout", "0"},
+    Fixed{"fault_reset_interval", kAny},  // the port comes back by itself
+    Fixed{"asCapable", "auto"},
+    Fixed{"BMCA", "ptp"},
+    Fixed{"inhibit_announce", "0"},
+    Fixed{"inhibit_delay_req", "0"},
+    Fixed{"ignore_source_id", "0"},
+    Fixed{"ignore_transport_specific", "0"},
+    Fixed{"assume_two_step", "0"},
+    Fixed{"path_trace_enabled", "0"},
+    Fixed{"follow_up_info", "0"},
+    Fixed{"hybrid_e2e", "0"},
+    Fixed{"inhibit_multicast_service", "0"},
+    Fixed{"net_sync_monitor", "0"},
+    Fixed{"tc_spanning_tree", "0"},
+    Fixed{"unicast_listen", "0"},
+    Fixed{"unicast_master_table", "0"},
+    Fixed{"unicast_req_duration", kAny},  // unicast negotiation only
+    Fixed{"use_syslog", kAny},            // messages go to standard output
+    Fixed{"verbose", kAny},
+    Fixed{"kernel_leap", kAny},  // the virtual clock has no kernel
+    Fixed{"check_fup_sync", "0"},
+    Fixed{"sanity_freq_limit", kAny},  // RAW is the estimator's clock: nothing to check against
+    Fixed{"ntpshm_segment", "0"},
+    Fixed{"msg_interval_request", "0"},
+    Fixed{"servo_num_offset_values", kAny},  // of servo_offset_threshold only
+    Fixed{"servo_offset_threshold", "0"},
+    Fixed{"write_phase_mode", "0"},
+    Fixed{"step_window", "0"},
+    Fixed{"ptp_dst_mac", kAny},  // IEEE 802.3 only
+    Fixed{"p2p_dst_mac", kAny},  // IEEE 802.3 only
+    Fixed{"udp6_scope", kAny},   // IPv6 only
+    Fixed{"uds_address", kAny},  // there is no management socket
+    Fixed{"uds_ro_address", kAny},
+    Fixed{"clock_type", "OC"},
+    Fixed{"tsproc_mode", "filter"},
+    Fixed{"boundary_clock_jbod", "0"},
+    Fixed{"productDescription", kAny},  // management only
+    Fixed{"revisionData", kAny},
+    Fixed{"manufacturerIdentity", kAny},
+    Fixed{"userDescription", kAny},
+};
+
+}  // namespace
+
+std::span<const PtpSetting> ptp_settings() { return kSettings; }
+
+std::optional<std::string> apply_setting(PtpOptions& options, std::string_view name,
+                                         std::string_view value) {
+  for (const PtpSetting& setting : kSettings) {
+    if (name != setting.name) continue;
+    if (auto wrong = setting.set(options, value)) return fmt::format("{}: {}", name, *wrong);
+    return std::nullopt;
+  }
+  for (const Fixed& fixed : kFixed) {
+    if (name != fixed.name) continue;
+    if (std::string_view{fixed.value} == kAny || value == fixed.value) return std::nullopt;
+    return fmt::format("{}: '{}' is not supported, only {}", name, value, fixed.value);
+  }
+  return fmt::format("unknown setting '{}'", name);
+}
+
+}  // namespace ftcs::app

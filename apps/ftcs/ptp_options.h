@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/platform/ptp_socket.h"
+#include "ftcs/platform/timestamp_clock.h"
+#include "ftcs/ptp/wire/identity.h"
+#include "ftcs/ptp/wire/message.h"
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs::app {
+
+enum class Role : std::uint8_t { kTimeReceiver, kTimeTransmitter };
+enum class Output : std::uint8_t { kText, kJson, kCsv };
+
+/// Everything that `ftcs ptp` can be told, from the command line or a configuration file. Defaults
+/// are ptp4l's where ptp4l has the option.
+struct PtpOptions {
+  std::string interface;
+  Role role = Role::kTimeReceiver;
+
+  platform::PtpSocketConfig socket{};
+  platform::TimestampMode timestamps = platform::TimestampMode::kBestAvailable;
+  Nanoseconds egress_latency{0};
+  Nanoseconds ingress_latency{0};
+
+  std::uint8_t domain = 0;
+  std::uint8_t major_sdo_id = 0;
+  std::uint8_t minor_version = 1;
+  std::int8_t log_announce_interval = 1;
+  std::int8_t log_sync_interval = 0;
+  std::int8_t log_min_delay_req_interval = 0;
+  std::uint8_t announce_receipt_timeout = 3;
+  std::uint8_t priority1 = 128;
+  std::uint8_t priority2 = 128;
+  ptp::ClockQuality quality{};
+  std::int16_t utc_offset = 37;
+  std::uint8_t time_source = 0xA0;
+  std::optional<ptp::ClockIdentity> clock_identity{};
+  Nanoseconds delay_asymmetry{0};
+
+  ServoConfig servo{};
+  bool free_running = false;  ///< ptp4l's free_running: measure, steer nothing
+  bool first_step = false;    ///< step once, whatever the servo
+  Nanoseconds first_step_threshold{20'000};
+  Nanoseconds step_threshold{0};
+
+  Duration initial_offset{};  ///< of the virtual clock against CLOCK_REALTIME
+  double skew_ppb = 0.0;      ///< of the virtual clock's oscillator
+
+  int log_level = 6;         ///< syslog's: 0 emergency to 7 debug
+  int summary_interval = 0;  ///< log2 of seconds
+  Output output = Output::kText;
+  std::optional<Duration> duration{};
+
+  std::vector<std::string>
+      notes;  ///< settings that mean less here than in ptp4l: logged at the start
+};
+
+}  // namespace ftcs::app

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/ptp_port.h"
+
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/ptp_receiver.h"
+#include "apps/ftcs/ptp_transmitter.h"
+#include "ftcs/platform/network_interface.h"
+
+namespace ftcs::app {
+namespace {
+
+// IEEE 1588-2019, 13.3.1: sequenceId.
+std::uint16_t sequence_id(std::span<const std::uint8_t> message) {
+  constexpr std::size_t kOffset = 30;
+  if (message.size() < kOffset + 2) return 0;
+  return static_cast<std::uint16_t>((message[kOffset] << 8) | message[kOffset + 1]);
+}
+
+VirtualClockConfig clock_config(const PtpOptions& options,
+                                const platform::TimestampClock::RealtimeReading& start) {
+  VirtualClockConfig config;
+  config.free_running = start.free_running;
+  config.local = LocalTime::from_ns(start.realtime_ns) + options.initial_offset;
+  config.limits = options.servo.limits;
+  return config;
+}
+
+}  // namespace
+
+PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+                 std::unique_ptr<platform::TimestampClock> timestamps)
+    : options_(options),
+      log_(log),
+      timestamps_(std::move(timestamps)),
+      start_(timestamps_->read_realtime()),
+      oscillator_(timestamps_->source(), Rate::from_ppb(options.skew_ppb), start_.free_running),
+      clock_(oscillator_, clock_config(options, start_)),
+      transport_(kernel, options.socket, *timestamps_, *this) {}
+
+int PtpPort::run() {
+  for (const std::string& note : options_.notes) log_(LogLevel::kNotice, "{}", note);
+  if (const auto error = transport_.open()) {
+    log_(LogLevel::kError, "{}", error->message());
+    return kRuntimeError;
+  }
+  report_stamps();
+  const platform::StopFlag stop;
+  perform(start(now()));
+  std::optional<FreeRunningTime> end;
+  if (options_.duration) end = now() + *options_.duration;
+  while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
+  if (failure_) {
+    log_(LogLevel::kError, "{}", *failure_);
+    return kRuntimeError;
+  }
+  return finish();
+}
+
+void PtpPort::turn(std::optional<FreeRunningTime> end) {
+  constexpr Duration kLongestTurn{std::chrono::seconds{1}};
+  FreeRunningTime until = now() + kLongestTurn;
+  if (end) until = std::min(until, *end);
+  if (const auto due = deadline()) until = std::min(until, *due);
+  transport_.wait_until(oscillator_.to_underlying(until));
+  if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
+  report_stamps();
+  housekeeping(now());
+}
+
+void PtpPort::perform(const ptp::ActionList& actions) {
+  for (const ptp::Action& action : actions) {
+    if (const auto* message = std::get_if<ptp::SendMessage>(&action)) {
+      send(*message);
+    } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
+      log_(LogLevel::kNotice, "port 1 ({}): {} to {} on {}", options_.interface,
+           to_string(change->from), to_string(change->to), to_string(change->event));
+      act(action);
+    } else {
+      act(action);
+    }
+  }
+}
+
+void PtpPort::fail(const std::string& reason) {
+  if (!failure_) failure_ = reason;
+}
+
+void PtpPort::send(const ptp::SendMessage& message) {
+  const bool answer = message.destination == ptp::Destination::kSender;
+  const auto error = transport_.send(message.channel, message.bytes.view(),
+                                     answer ? sender_ : std::optional<in_addr>{});
+  if (error && !send_failed_) log_(LogLevel::kWarning, "{}", error->message());
+  send_failed_ = error.has_value();  // one line for a series of failures
+  if (error && message.channel == ptp::Channel::kEvent) {
+    perform(on_sent(message.sequence_id, std::nullopt, now()));
+  }
+}
+
+void PtpPort::on_message(const platform::ReceivedMessage& message) {
+  sender_ = message.sender;
+  if (message.channel == ptp::Channel::kGeneral) return perform(on_general(message.bytes, now()));
+  if (!message.stamp) return;  // counted by the socket
+  const FreeRunningTime received =
+      oscillator_.from_underlying(message.stamp->time) - Duration{options_.ingress_latency};
+  perform(on_event(message.bytes, received, now()));
+}
+
+void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
+  std::optional<FreeRunningTime> sent;
+  if (message.stamp) {
+    sent = oscillator_.from_underlying(message.stamp->time) + Duration{options_.egress_latency};
+  } else {
+    log_(LogLevel::kWarning,
+         "port 1 ({}): no transmit timestamp within {} ms (tx_timestamp_timeout)",
+         options_.interface,
+         std::chrono::duration_cast<std::chrono::milliseconds>(options_.socket.tx_timestamp_timeout)
+             .count());
+  }
+  perform(on_sent(sequence_id(message.bytes), sent, now()));
+}
+
+void PtpPort::on_link(bool up, const std::string& reason) {
+  log_(LogLevel::kNotice, "port 1 ({}): link {}{}{}", options_.interface, up ? "up" : "down",
+       reason.empty() ? "" : ": ", reason);
+  perform(on_link_change(up, now()));
+}
+
+void PtpPort::report_stamps() {
+  const platform::PtpSocket* socket = transport_.socket();
+  if (socket == nullptr) return;
+  const auto stamps = socket->transmit_stamps();
+  if (reported_stamps_ == stamps) return;
+  reported_stamps_ = stamps;
+  const bool last_resort = stamps == platform::StampSource::kUserSpace;
+  log_(last_resort ? LogLevel::kWarning : LogLevel::kInfo,
+       "port 1 ({}): receive timestamps by {}, transmit timestamps by {}{}", options_.interface,
+       name(socket->receive_stamps()), name(stamps),
+       last_resort ? ": expect errors of tens of microseconds" : "");
+}
+
+Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& kernel,
+                                                           const PtpOptions& options) {
+  if (options.clock_identity) return ptp::PortIdentity{*options.clock_identity, 1};
+  const auto address = platform::identity_address(kernel, options.interface);
+  if (!address) return address.error();
+  return ptp::PortIdentity{ptp::ClockIdentity::from_mac(*address), 1};
+}
+
+int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
+  Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
+  Log errors(kernel, stderr, options.log_level);
+  auto timestamps = platform::TimestampClock::open(kernel, options.interface, options.timestamps);
+  if (!timestamps) {
+    errors(LogLevel::kError, "{}", timestamps.error().message());
+    return kRuntimeError;
+  }
+  const auto identity = port_identity(kernel, options);
+  if (!identity) {
+    errors(LogLevel::kError, "{}", identity.error().message());
+    return kRuntimeError;
+  }
+  if (options.role == Role::kTimeReceiver) {
+    return PtpReceiver(kernel, options, log, std::move(*timestamps), *identity).run();
+  }
+  return PtpTransmitter(kernel, options, log, std::move(*timestamps), *identity).run();
+}
+
+}  // namespace ftcs::app

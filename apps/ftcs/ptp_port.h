@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "apps/ftcs/log.h"
+#include "apps/ftcs/ptp_options.h"
+#include "ftcs/clock/skewed_source.h"
+#include "ftcs/clock/virtual_clock.h"
+#include "ftcs/platform/ptp_transport.h"
+#include "ftcs/platform/stop_flag.h"
+#include "ftcs/platform/timestamp_clock.h"
+#include "ftcs/ptp/actions.h"
+
+namespace ftcs::app {
+
+/// What a time receiver and a time transmitter have in common around their protocol cores: sockets,
+/// the virtual clock, the loop, the log. All instants are readings of the (possibly skewed)
+/// free-running oscillator.
+class PtpPort : private platform::TransportHandler {
+ public:
+  PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+          std::unique_ptr<platform::TimestampClock> timestamps);
+  ~PtpPort() override = default;
+
+  /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
+  [[nodiscard]] int run();
+
+ protected:
+  virtual ptp::ActionList start(FreeRunningTime now) = 0;
+  virtual ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                                   FreeRunningTime now) = 0;
+  virtual ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) = 0;
+  virtual ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
+                                  FreeRunningTime now) = 0;
+  virtual ptp::ActionList on_timer(FreeRunningTime now) = 0;
+  virtual ptp::ActionList on_link_change(bool up, FreeRunningTime now) = 0;
+  [[nodiscard]] virtual std::optional<FreeRunningTime> deadline() const = 0;
+  /// Actions that only one of the roles knows.
+  virtual void act(const ptp::Action& action) = 0;
+  /// Once per turn of the loop.
+  virtual void housekeeping(FreeRunningTime) {}
+  /// Writes the summary, returns the exit code.
+  [[nodiscard]] virtual int finish() = 0;
+
+  void perform(const ptp::ActionList& actions);
+  /// Ends run() with an error line.
+  void fail(const std::string& reason);
+  [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
+  [[nodiscard]] VirtualClock& clock() { return clock_; }
+  [[nodiscard]] const PtpOptions& options() const { return options_; }
+  [[nodiscard]] Log& log() { return log_; }
+  [[nodiscard]] double seconds_since_start() { return (now() - start_.free_running).seconds(); }
+  [[nodiscard]] bool has_hardware_stamps() const { return timestamps_->is_hardware(); }
+
+ private:
+  void on_message(const platform::ReceivedMessage& message) override;
+  void on_transmitted(const platform::TransmittedMessage& message) override;
+  void on_link(bool up, const std::string& reason) override;
+  void send(const ptp::SendMessage& message);
+  void report_stamps();
+  void turn(std::optional<FreeRunningTime> end);
+
+  PtpOptions options_;
+  Log& log_;
+  std::unique_ptr<platform::TimestampClock> timestamps_;
+  platform::TimestampClock::RealtimeReading start_;
+  SkewedSource oscillator_;
+  VirtualClock clock_;
+  platform::PtpTransport transport_;
+  std::optional<in_addr> sender_{};  ///< of the message that is being handled
+  std::optional<platform::StampSource> reported_stamps_{};
+  bool send_failed_ = false;
+  std::optional<std::string> failure_{};
+};
+
+/// An identity for the port: configured, made of the interface's address, or (loopback has none) of
+/// the process.
+[[nodiscard]] Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& kernel,
+                                                                         const PtpOptions& options);
+
+/// Opens clock and sockets and runs the role that the options ask for. Returns an exit code.
+[[nodiscard]] int run_ptp(platform::Kernel& kernel, const PtpOptions& options);
+
+}  // namespace ftcs::app
