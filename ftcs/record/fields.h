@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace ftcs {
+
+/// Without spaces and tabs at both ends.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+
+/// What separates the fields of a line: a comma if there is one, else a semicolon, else runs of
+/// spaces and tabs (' ').
+[[nodiscard]] char separator_of(std::string_view line);
+
+/// Fields, trimmed, without the double quotes around them. The views point into `line`.
+[[nodiscard]] std::vector<std::string_view> split_fields(std::string_view line, char separator);
+
+/// The whole of `text` as a finite decimal number, with or without sign and exponent; independent
+/// of the locale.
+[[nodiscard]] std::optional<double> parse_decimal(std::string_view text);
+
+/// An empty field, "-", "nan", "na", "null": a value that is known to be missing. Case does not
+/// matter.
+[[nodiscard]] bool is_missing(std::string_view text);
+
+}  // namespace ftcs

@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/record/series_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "ftcs/record/fields.h"
+#include "ftcs/record/offset_log.h"
+#include "ftcs/record/time_grid.h"
+#include "ftcs/record/units.h"
+
+namespace ftcs {
+namespace {
+
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+/// Steady, seconds-long steps are the custom of phase files without times.
+constexpr double kDefaultInterval = 1.0;
+
+/// Values and times as they stand in the file.
+struct RawSeries {
+  std::vector<double> values;
+  std::vector<double> times;  // empty = the file has none
+};
+
+/// Where a table keeps what; columns from 0.
+struct TableLayout {
+  char separator = ' ';
+  std::vector<std::string> headings;  // empty = none
+  std::size_t columns = 0;
+  std::size_t value_column = 0;
+  std::optional<std::size_t> time_column;
+  double value_scale = 1.0;
+  double time_scale = 1.0;
+};
+
+std::string lower(std::string_view text) {
+  std::string copy(text);
+  std::transform(copy.begin(), copy.end(), copy.begin(),
+                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
+  return copy;
+}
+
+bool is_comment(std::string_view line) {
+  return line.empty() || line.front() == '#' || line.front() == '%' || line.front() == ';';
+}
+
+bool is_heading_of_time(std::string_view heading) {
+  const std::string word = lower(heading);
+  if (word == "t") return true;
+  constexpr std::array<std::string_view, 5> kNames = {"time", "timestamp", "date", "epoch", "mjd"};
+  return std::any_of(kNames.begin(), kNames.end(), [&word](std::string_view known) {
+    if (!word.starts_with(known)) return false;
+    return word.size() == known.size() ||
+           std::isalpha(static_cast<unsigned char>(word[known.size()])) == 0;
+  });
+}
+
+/// "3" or a heading, as an index from 0; npos = there is none.
+std::size_t find_column(const TableLayout& layout, const std::string& wanted) {
+  for (std::size_t i = 0; i < layout.headings.size(); ++i) {
+    if (layout.headings[i] == wanted) return i;
+  }
+  std::size_t number = 0;
+  const auto [end, code] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), number);
+  if (code != std::errc() || end != wanted.data() + wanted.size()) return std::string::npos;
+  return number >= 1 && number <= layout.columns ? number - 1 : std::string::npos;
+}
+
+std::string no_such_column(const TableLayout& layout, const std::string& wanted) {
+  std::string message = "there is no column " + quoted_excerpt(wanted) + ": expected 1 to " +
+                        std::to_string(layout.columns);
+  for (std::size_t i = 0; i < layout.headings.size(); ++i) {
+    message += (i == 0 ? " or " : ", ") + quoted_excerpt(layout.headings[i]);
+  }
+  return message;
+}
+
+RecordKind kind_of(const SeriesOptions& options, std::string_view heading) {
+  if (options.kind) return *options.kind;
+  const std::string unit = options.unit.empty() ? unit_in_heading(heading) : options.unit;
+  const std::string word = lower(heading);
+  if (fraction_of_unit(unit) || word.find("freq") != std::string::npos)
+    return RecordKind::kFrequency;
+  return word.find("offset") != std::string::npos ? RecordKind::kOffset : RecordKind::kPhase;
+}
+
+/// Unit of the values, and their scale to seconds or fractions.
+Result<double, ReadError> choose_unit(const SeriesOptions& options, std::string_view heading,
+                                      Series& series, const LineReader& reader) {
+  const bool frequency = series.kind == RecordKind::kFrequency;
+  std::string unit = options.unit;
+  const char* reason = "as asked";
+  if (unit.empty()) {
+    unit = unit_in_heading(heading);
+    reason = "from the heading";
+  }
+  if (unit.empty()) {
+    unit = frequency ? "1" : series.kind == RecordKind::kOffset ? "ns" : "s";
+    reason = "by convention; --unit sets it";
+  }
+  const auto scale = frequency ? fraction_of_unit(unit) : seconds_of_unit(unit);
+  if (!scale) {
+    return reader.error_here("the unit of " + std::string(name(series.kind)) +
+                             " values is one of " +
+                             (frequency ? "1, ppm, ppb, ppt" : "s, ms, us, ns, ps, d") + ", got " +
+                             quoted_excerpt(unit));
+  }
+  series.notes.push_back("values: " + std::string(name(series.kind)) + " in " + unit + " (" +
+                         reason + ")");
+  return *scale;
+}
+
+class TableReader {
+ public:
+  TableReader(LineReader& reader, const SeriesOptions& options, Series& series)
+      : reader_(reader), options_(options), series_(series) {}
+
+  /// The first line that is no comment: heading or data.
+  std::optional<ReadError> begin(std::string_view line) {
+    layout_.separator = separator_of(line);
+    const auto fields = split_fields(line, layout_.separator);
+    layout_.columns = fields.size();
+    const bool heading = std::none_of(fields.begin(), fields.end(), [](std::string_view field) {
+      return parse_decimal(field).has_value();
+    });
+    const bool words = std::any_of(fields.begin(), fields.end(),
+                                   [](std::string_view field) { return !is_missing(field); });
+    if (heading && words) layout_.headings.assign(fields.begin(), fields.end());
+    if (auto error = choose_columns()) return error;
+    return layout_.headings.empty() ? add(line) : std::nullopt;
+  }
+
+  std::optional<ReadError> add(std::string_view line) {
+    const auto fields = split_fields(line, layout_.separator);
+    const std::size_t needed = std::max(layout_.value_column, layout_.time_column.value_or(0)) + 1;
+    if (fields.size() < needed) {
+      return reader_.error_here("expected at least " + std::to_string(needed) + " columns, got " +
+                                std::to_string(fields.size()) + " (a truncated line?)");
+    }
+    if (layout_.time_column) {
+      if (auto error = add_time(fields[*layout_.time_column])) return error;
+    }
+    const std::string_view field = fields[layout_.value_column];
+    const auto value = parse_decimal(field);
+    if (!value && !is_missing(field)) {
+      return reader_.error_here("expected a finite number in column " +
+                                std::to_string(layout_.value_column + 1) + ", got " +
+                                quoted_excerpt(field));
+    }
+    raw.values.push_back(value ? *value * layout_.value_scale : kMissing);
+    return std::nullopt;
+  }
+
+  RawSeries raw;
+
+ private:
+  std::optional<ReadError> choose_columns() {
+    const auto& headings = layout_.headings;
+    if (options_.time_column.empty()) {
+      const auto known = std::find_if(headings.begin(), headings.end(), is_heading_of_time);
+      if (known != headings.end()) {
+        layout_.time_column = static_cast<std::size_t>(known - headings.begin());
+      } else if (headings.empty() && layout_.columns > 1) {
+        layout_.time_column = 0;
+      }
+    } else if (options_.time_column != "none") {
+      layout_.time_column = find_column(layout_, options_.time_column);
+      if (*layout_.time_column == std::string::npos) {
+        return reader_.error_here(no_such_column(layout_, options_.time_column));
+      }
+    }
+    if (options_.column.empty()) {
+      layout_.value_column = layout_.time_column == std::size_t{0} && layout_.columns > 1 ? 1 : 0;
+    } else {
+      layout_.value_column = find_column(layout_, options_.column);
+      if (layout_.value_column == std::string::npos) {
+        return reader_.error_here(no_such_column(layout_, options_.column));
+      }
+    }
+    if (layout_.time_column == layout_.value_column) layout_.time_column.reset();
+    return choose_scales();
+  }
+
+  std::optional<ReadError> choose_scales() {
+    const std::string heading =
+        layout_.headings.empty() ? std::string() : layout_.headings[layout_.value_column];
+    series_.kind = kind_of(options_, heading);
+    series_.notes.push_back("values from column " + std::to_string(layout_.value_column + 1) +
+                            (heading.empty() ? "" : " " + quoted_excerpt(heading)) + " of " +
+                            std::to_string(layout_.columns));
+    const auto scale = choose_unit(options_, heading, series_, reader_);
+    if (!scale) return scale.error();
+    layout_.value_scale = *scale;
+    if (!layout_.time_column) return std::nullopt;
+    std::string unit = options_.time_unit;
+    if (unit.empty() && !layout_.headings.empty()) {
+      unit = unit_in_heading(layout_.headings[*layout_.time_column]);
+    }
+    const auto seconds = seconds_of_unit(unit.empty() ? "s" : unit);
+    if (!seconds) {
+      return reader_.error_here("the unit of times is one of s, ms, us, ns, ps, d, got " +
+                                quoted_excerpt(unit));
+    }
+    layout_.time_scale = *seconds;
+    series_.notes.push_back("times from column " + std::to_string(*layout_.time_column + 1) +
+                            " in " + (unit.empty() ? "s" : unit));
+    return std::nullopt;
+  }
+
+  std::optional<ReadError> add_time(std::string_view field) {
+    const auto time = parse_decimal(field);
+    if (!time) {
+      return reader_.error_here("expected a time in column " +
+                                std::to_string(*layout_.time_column + 1) + ", got " +
+                                quoted_excerpt(field));
+    }
+    // The origin is taken off before the unit is applied, so that epochs keep their digits.
+    if (raw.times.empty()) origin_ = *time;
+    const double seconds = (*time - origin_) * layout_.time_scale;
+    if (!raw.times.empty() && seconds < raw.times.back()) {
+      return reader_.error_here("expected ascending times in column " +
+                                std::to_string(*layout_.time_column + 1) + ", got " +
+                                quoted_excerpt(field) +
+                                " after a later one (--time-column none ignores them)");
+    }
+    raw.times.push_back(seconds);
+    return std::nullopt;
+  }
+
+  LineReader& reader_;
+  const SeriesOptions& options_;
+  Series& series_;
+  TableLayout layout_;
+  double origin_ = 0.0;
+};
+
+class LogReader {
+ public:
+  explicit LogReader(Series& series) : series_(series) {}
+
+  void add(std::string_view line) {
+    const auto parsed = parse_offset_log_line(line);
+    if (!parsed) {
+      ++series_.lines_left_out;
+      return;
+    }
+    constexpr int kLocked = 2;
+    if (parsed->state >= kLocked && !locked_) {
+      locked_ = true;
+      before_lock_ = raw.values.size();
+      raw = {};
+      all_timed_ = true;
+    }
+    raw.values.push_back(parsed->offset_ns * 1e-9);
+    // A restarted program begins a new clock: times that go back end their use.
+    all_timed_ =
+        all_timed_ && parsed->time_s && (raw.times.empty() || *parsed->time_s >= raw.times.back());
+    if (all_timed_) raw.times.push_back(*parsed->time_s);
+  }
+
+  void finish() {
+    if (!all_timed_) raw.times.clear();
+    series_.kind = RecordKind::kOffset;
+    series_.notes.push_back("a log of linuxptp: offsets in ns, local minus reference");
+    if (locked_ && before_lock_ > 0) {
+      series_.notes.push_back(std::to_string(before_lock_) +
+                              " offsets before the servo locked (s2) are left out");
+    }
+    if (!locked_) series_.notes.push_back("the servo never locked (s2): all offsets are taken");
+    if (!all_timed_)
+      series_.notes.push_back("not every line has an ascending time: equal intervals are assumed");
+  }
+
+  RawSeries raw;
+
+ private:
+  Series& series_;
+  bool locked_ = false;
+  bool all_timed_ = true;
+  std::size_t before_lock_ = 0;
+};
+
+/// From raw values to the grid, and the last checks.
+std::optional<ReadError> finish(RawSeries raw, const SeriesOptions& options,
+                                const LineReader& reader, Series& series) {
+  ReadError whole = reader.error_here("");
+  whole.line = 0;
+  const bool any = std::any_of(raw.values.begin(), raw.values.end(),
+                               [](double value) { return std::isfinite(value); });
+  if (!any) {
+    whole.message = reader.line_number() == 0
+                        ? "the file is empty: expected numbers or a log of linuxptp"
+                        : "expected numbers or offsets of a log, got none in " +
+                              std::to_string(reader.line_number()) + " lines";
+    return whole;
+  }
+  if (raw.times.size() == raw.values.size()) {
+    auto grid = place_on_grid(raw.values, raw.times, options.interval_s);
+    if (!grid) {
+      whole.message = grid.error().message;
+      return whole;
+    }
+    series.values = std::move(grid->values);
+    series.interval_s = grid->interval_s;
+    if (grid->crowded > 0) {
+      series.notes.push_back(std::to_string(grid->crowded) +
+                             " values came less than half an interval after the one before");
+    }
+  } else {
+    series.values = std::move(raw.values);
+    series.interval_s = options.interval_s.value_or(kDefaultInterval);
+    if (!options.interval_s)
+      series.notes.emplace_back("no times: an interval of 1 s is assumed; --interval sets it");
+  }
+  series.samples =
+      static_cast<std::size_t>(std::count_if(series.values.begin(), series.values.end(),
+                                             [](double value) { return std::isfinite(value); }));
+  series.missing = series.values.size() - series.samples;
+  return std::nullopt;
+}
+
+}  // namespace
+
+const char* name(RecordKind kind) noexcept {
+  switch (kind) {
+    case RecordKind::kPhase:
+      return "phase";
+    case RecordKind::kFrequency:
+      return "frequency";
+    case RecordKind::kOffset:
+      return "offset";
+  }
+  return "unknown";
+}
+
+Result<Series, ReadError> read_series(const std::string& path, const SeriesOptions& options) {
+  auto opened = LineReader::open(path);
+  if (!opened) return opened.error();
+  LineReader& reader = *opened;
+  Series series;
+  TableReader table(reader, options, series);
+  LogReader log(series);
+  enum class Format { kUnknown, kTable, kLog } format = Format::kUnknown;
+  while (const auto line = reader.next()) {
+    const std::string_view text = trimmed(*line);
+    if (is_comment(text)) continue;
+    std::optional<ReadError> error;
+    if (format == Format::kUnknown) {
+      const bool from_log = is_linuxptp_line(text) || parse_offset_log_line(text);
+      format = from_log ? Format::kLog : Format::kTable;
+      if (!from_log) error = table.begin(text);
+    } else if (format == Format::kTable) {
+      error = table.add(text);
+    }
+    if (format == Format::kLog) log.add(text);
+    if (error) return *error;
+  }
+  if (reader.error()) return *reader.error();
+  if (format == Format::kLog) log.finish();
+  if (auto error = finish(std::move(format == Format::kLog ? log.raw : table.raw), options, reader,
+                          series)) {
+    return *error;
+  }
+  return series;
+}
+
+}  // namespace ftcs

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// World: small files of every kind that is understood, and of many that are not.
+#include "ftcs/record/series_reader.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+namespace ftcs {
+namespace {
+
+class SeriesReader : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = ::testing::TempDir() + "ftcs_series_" +
+            ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+
+  Result<Series, ReadError> read(std::string_view content, const SeriesOptions& options = {}) {
+    std::ofstream(path_, std::ios::binary) << content;
+    return read_series(path_, options);
+  }
+  /// The error without the name of the file.
+  std::string error(std::string_view content, const SeriesOptions& options = {}) {
+    const auto series = read(content, options);
+    return series ? "no error" : series.error().text().substr(path_.size());
+  }
+
+  std::string path_;
+};
+
+TEST_F(SeriesReader, takes_one_column_for_phase_in_seconds_at_one_second) {
+  const auto series = read("# counter\n1e-9\n2e-9\n\n-3e-9\n");
+  ASSERT_TRUE(series.ok());
+  EXPECT_EQ(series->kind, RecordKind::kPhase);
+  EXPECT_EQ(series->values, (std::vector<double>{1e-9, 2e-9, -3e-9}));
+  EXPECT_EQ(series->interval_s, 1.0);
+  EXPECT_EQ(series->samples, 3U);
+}
+
+TEST_F(SeriesReader, takes_the_first_of_two_columns_for_time) {
+  const auto series = read("100 1\n100.5 2\n101.5 3\n102 4\n102.5 5\n");
+  ASSERT_TRUE(series.ok());
+  EXPECT_EQ(series->interval_s, 0.5);
+  EXPECT_EQ(series->values.size(), 6U);
+  EXPECT_EQ(series->missing, 1U);
+}
+
+TEST_F(SeriesReader, learns_kind_and_units_from_headings) {
+  const auto series = read("time_ms,state,offset_us\n0,x,1\n250,y,-2\n500,z,nan\n");
+  SeriesOptions options;
+  options.column = "offset_us";
+  const auto offsets = read("time_ms,state,offset_us\n0,x,1\n250,y,-2\n500,z,nan\n", options);
+  EXPECT_FALSE(series.ok());  // the first column that is no time holds words
+  ASSERT_TRUE(offsets.ok());
+  EXPECT_EQ(offsets->kind, RecordKind::kOffset);
+  EXPECT_DOUBLE_EQ(offsets->interval_s, 0.25);
+  EXPECT_DOUBLE_EQ(offsets->values[1], -2e-6);
+  EXPECT_EQ(offsets->missing, 1U);
+}
+
+TEST_F(SeriesReader, does_what_it_is_told) {
+  SeriesOptions options;
+  options.column = "1";
+  options.time_column = "none";
+  options.kind = RecordKind::kFrequency;
+  options.unit = "ppb";
+  options.interval_s = 0.1;
+  const auto series = read("3;x\n1;y\n", options);
+  ASSERT_TRUE(series.ok());
+  EXPECT_EQ(series->kind, RecordKind::kFrequency);
+  EXPECT_EQ(series->interval_s, 0.1);
+  EXPECT_DOUBLE_EQ(series->values[0], 3e-9);
+}
+
+TEST_F(SeriesReader, keeps_the_digits_of_an_epoch_in_nanoseconds) {
+  SeriesOptions options;
+  options.time_unit = "ns";
+  const auto series =
+      read("1700000000000000000 1\n1700000000125000000 2\n1700000000250000000 3\n", options);
+  ASSERT_TRUE(series.ok());
+  EXPECT_NEAR(series->interval_s, 0.125, 1e-6);
+}
+
+TEST_F(SeriesReader, reads_a_log_from_its_lock_on) {
+  const auto series = read(
+      "ptp4l[1.0]: selected /dev/ptp0 as PTP clock\n"
+      "ptp4l[2.0]: master offset 90000 s0 freq +0 path delay 100\n"
+      "ptp4l[3.0]: master offset 90100 s1 freq +100 path delay 100\n"
+      "ptp4l[4.0]: master offset -50 s2 freq +50 path delay 100\n"
+      "ptp4l[4.0]: port 1: UNCALIBRATED to SLAVE\n"
+      "ptp4l[5.0]: master offset 20 s2 freq +60 path delay 100\n"
+      "ptp4l[8.0]: master offset 10 s2 freq +60 path delay 100\n"
+      "ptp4l[9.0]: master offset 10 s2 freq +60 path delay 100\n");
+  ASSERT_TRUE(series.ok());
+  EXPECT_EQ(series->kind, RecordKind::kOffset);
+  EXPECT_EQ(series->samples, 4U);
+  EXPECT_EQ(series->missing, 2U);
+  EXPECT_EQ(series->lines_left_out, 2U);
+  EXPECT_DOUBLE_EQ(series->values[0], -50e-9);
+}
+
+TEST_F(SeriesReader, says_what_was_expected_and_what_came) {
+  EXPECT_EQ(error(""), ": the file is empty: expected numbers or a log of linuxptp");
+  EXPECT_EQ(error("# only\n# comments\n"),
+            ": expected numbers or offsets of a log, got none in 2 lines");
+  EXPECT_EQ(error("nan\nnan\n"), ": expected numbers or offsets of a log, got none in 2 lines");
+  EXPECT_EQ(error("1\n2\nthree\n"), ":3: expected a finite number in column 1, got 'three'");
+  EXPECT_EQ(error("1\ninf\n"), ":2: expected a finite number in column 1, got 'inf'");
+  EXPECT_EQ(error("1 5\n2 6\n3\n"), ":3: expected at least 2 columns, got 1 (a truncated line?)");
+  EXPECT_EQ(error("1 5\nx 6\n"), ":2: expected a time in column 1, got 'x'");
+  EXPECT_NE(error("2 5\n1 6\n").find(":2: expected ascending times in column 1, got '1'"),
+            std::string::npos);
+  EXPECT_NE(error("ptp4l[1.0]: port 1: LISTENING\n").find("got none in 1 lines"),
+            std::string::npos);
+  EXPECT_NE(error("the quick brown fox\njumps\n").find("column 1, got 'jumps'"), std::string::npos);
+}
+
+TEST_F(SeriesReader, refuses_columns_and_units_that_do_not_exist) {
+  SeriesOptions options;
+  options.column = "7";
+  EXPECT_EQ(error("time,offset\n1,2\n", options),
+            ":1: there is no column '7': expected 1 to 2 or 'time', 'offset'");
+  options.column = "";
+  options.unit = "ppb";
+  options.kind = RecordKind::kOffset;
+  EXPECT_EQ(error("1\n", options),
+            ":1: the unit of offset values is one of s, ms, us, ns, ps, d, got 'ppb'");
+  options.unit = "";
+  options.time_unit = "fortnight";
+  EXPECT_NE(error("1 2\n", options).find("unit of times"), std::string::npos);
+}
+
+TEST_F(SeriesReader, refuses_binary_data) {
+  EXPECT_NE(error(std::string_view("\x1f\x8b\x08\x00", 4)).find("gzip data"), std::string::npos);
+  EXPECT_EQ(error(std::string_view("\0\1\2", 3)), ":1: expected text or gzip, got binary data");
+}
+
+}  // namespace
+}  // namespace ftcs
