@@ -72,8 +72,8 @@ class AffinePlant {
   void apply(const ServoCommand& command) {
     start_local_ = local().since_epoch() + command.step;
     start_ = elapsed_;
-    correction_rate_ = command.correction_rate.ratio();
-    tracking_rate_ = command.tracking_rate.ratio();
+    correction_rate_ = static_cast<long double>(command.correction_rate.ratio());
+    tracking_rate_ = static_cast<long double>(command.tracking_rate.ratio());
     correction_span_ = scaled(command.correction_time, 1.0L / tracking_rate_);
   }
 
