@@ -151,8 +151,9 @@ std::optional<DecodeError> check_tlvs(std::span<const std::uint8_t> message,
     ByteReader reader(message.subspan(offset + 2, 2));
     const std::size_t length = reader.read<std::uint16_t>();
     const std::size_t room = message.size() - offset - kTlvHeaderSize;
-    if (length > room || length % 2 != 0) {
-      return DecodeError{DecodeReason::kMalformedTlv, room, length, offset + 2};
+    if (length > room) return DecodeError{DecodeReason::kMalformedTlv, room, length, offset + 2};
+    if (length % 2 != 0) {
+      return DecodeError{DecodeReason::kMalformedTlv, length - 1, length, offset + 2};
     }
     offset += kTlvHeaderSize + length;
   }
