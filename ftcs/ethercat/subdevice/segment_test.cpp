@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// The world: SubDevices whose hops and cables the test chose; crystals of 1 ns tick unless said.
+// Oracle: the delays that follow from adding up the configured hops by hand.
+#include "ftcs/ethercat/subdevice/segment.h"
+
+#include <gtest/gtest.h>
+
+#include "ftcs/ethercat/test/wire_bench.h"
+
+namespace ftcs::ethercat {
+namespace {
+
+using test::WireBench;
+using enum Command;
+
+SubDeviceConfig fine_clock() {
+  SubDeviceConfig config;
+  config.clock.tick = Nanoseconds{1};
+  return config;
+}
+
+TEST(Segment, a_line_is_visited_in_order_and_the_frame_comes_back_after_all_hops) {
+  WireBench bench;
+  bench.add_line(3, Nanoseconds{50});
+  const WireTime sent = bench.now();
+  bench.read({kBrd, 0, 0}, 1);
+  // Cable to the first and back, then per hop 300 ns and 50 ns each way.
+  EXPECT_EQ(bench.returned() - sent, Duration{Nanoseconds{6 * 50 + 5 * 300}});
+  EXPECT_EQ(bench.segment().delay_to(2), Duration{Nanoseconds{2 * 350}});
+}
+
+//        ┌─3─ b (1)
+//   0 ── a
+//        ├─1─ c (2) ─1─ d (3)
+//        └─2─ e (4)
+TEST(Segment, branches_are_visited_in_the_order_three_one_two) {
+  WireBench bench;
+  const int a = static_cast<int>(bench.add({}));
+  bench.add({.parent = a, .parent_port = 1});
+  bench.add({.parent = a, .parent_port = 2});
+  bench.add({.parent = a, .parent_port = 3});
+  bench.add({.parent = 1, .parent_port = 1});
+  const std::size_t expected[] = {0, 3, 1, 4, 2};
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(bench.segment().at_position(i), expected[i]);
+}
+
+TEST(Segment, receive_times_are_latched_at_each_open_port_as_the_frame_passes) {
+  WireBench bench;
+  bench.add({}, 0, fine_clock());
+  bench.add({.parent = 0, .parent_port = 3, .cable = Nanoseconds{100}}, 0, fine_clock());
+  bench.add({.parent = 0, .parent_port = 1, .cable = Nanoseconds{20}}, 0, fine_clock());
+  bench.write({kBwr, 0, reg::kReceiveTimePort0}, std::uint32_t{0});
+  const EscMemory& memory = bench.segment()[0].memory();
+  const auto port = [&](std::size_t p) {
+    return memory.get<std::uint32_t>(reg::kReceiveTimePort0 + 4 * p);
+  };
+  EXPECT_EQ(port(3) - port(0), 300U + 100U + 300U + 100U);
+  EXPECT_EQ(port(1) - port(3), 300U + 20U + 300U + 20U);
+  EXPECT_EQ(port(2), 0U) << "closed";
+  EXPECT_EQ(memory.get<std::uint64_t>(reg::kReceiveTimeProcessingUnit), port(0));
+}
+
+TEST(Segment, dl_status_shows_open_and_closed_ports) {
+  WireBench bench;
+  bench.add_line(2);
+  const DlStatus first{bench.segment()[0].memory().get<std::uint16_t>(reg::kDlStatus)};
+  const DlStatus last{bench.segment()[1].memory().get<std::uint16_t>(reg::kDlStatus)};
+  EXPECT_TRUE(first.open(0) && first.open(1) && !first.open(2) && !first.open(3));
+  EXPECT_TRUE(last.open(0) && !last.open(1));
+  EXPECT_TRUE(last.loop_closed(1));
+}
+
+TEST(Segment, a_cut_cable_hides_what_is_behind_it_until_it_is_mended) {
+  WireBench bench;
+  bench.add_line(4);
+  bench.segment().set_cut(2, true);
+  EXPECT_EQ(bench.read({kBrd, 0, 0}, 1).working_counter, 2);
+  EXPECT_FALSE(DlStatus{bench.segment()[1].memory().get<std::uint16_t>(reg::kDlStatus)}.open(1));
+  bench.segment().set_cut(2, false);
+  EXPECT_EQ(bench.read({kBrd, 0, 0}, 1).working_counter, 4);
+  bench.segment().set_cut(0, true);
+  EXPECT_EQ(bench.read({kBrd, 0, 0}, 1).working_counter, 0);
+}
+
+TEST(Segment, refuses_impossible_wiring) {
+  WireBench bench;
+  AffineOscillator crystal;
+  Segment& segment = bench.segment();
+  EXPECT_EQ(segment.add({}, {.parent = 0}, crystal).error(), SegmentError::kNoSuchParent);
+  bench.add({});
+  EXPECT_EQ(segment.add({}, {.parent = 1}, crystal).error(), SegmentError::kNoSuchParent);
+  EXPECT_EQ(segment.add({}, {.parent = 0, .parent_port = 0}, crystal).error(),
+            SegmentError::kPortTaken);
+  bench.add({.parent = 0, .parent_port = 1});
+  EXPECT_EQ(segment.add({}, {.parent = 0, .parent_port = 1}, crystal).error(),
+            SegmentError::kPortTaken);
+}
+
+/// Error of the local copy of the second of two SubDevices against the first, in ns, from the
+/// crystals themselves (not from 0x092C).
+double true_error(WireBench& bench) {
+  const WireTime now = bench.now();
+  const auto reference = bench.segment()[0].dc().system_time(now);
+  const auto copy = bench.segment()[1].dc().system_time(now);
+  return static_cast<double>(static_cast<std::int64_t>(copy - reference));
+}
+
+TEST(DistributedClock, a_copy_settles_within_a_second_at_any_skew_and_holds_between_frames) {
+  for (const double ppm : {-100.0, 100.0, 250.0}) {
+    SCOPED_TRACE(ppm);
+    WireBench bench;
+    bench.add({}, -ppm / 2);
+    bench.add({.parent = 0}, ppm / 2);
+    bench.set_step(Nanoseconds{1'000'000});
+    // The two local clocks started together, 300 ns of hop are not compensated: tell the second.
+    bench.write(Target::at_position(kApwr, 1, reg::kSystemTimeDelay), std::uint32_t{300});
+    for (int i = 0; i < 1000; ++i) {
+      bench.read(Target::at_position(kArmw, 0, reg::kSystemTime), 8);
+    }
+    EXPECT_LT(std::abs(bench.segment()[1].system_time_difference()), 100);
+    EXPECT_NEAR(true_error(bench), 0.0, 50.0);
+    bench.wait(Nanoseconds{9'000'000});  // no frame for ten cycles
+    EXPECT_NEAR(true_error(bench), 0.0, 100.0);
+  }
+}
+
+TEST(DistributedClock, four_byte_system_times_compare_modulo_two_to_the_thirty_second) {
+  WireBench bench;
+  SubDeviceConfig config;
+  config.clock.initial_local = Nanoseconds{0xFFFF0000};
+  bench.add({}, 20, config);
+  bench.add({.parent = 0}, -20, config);
+  bench.set_step(Nanoseconds{100'000});
+  for (int i = 0; i < 3000; ++i) bench.read(Target::at_position(kArmw, 0, reg::kSystemTime), 4);
+  EXPECT_LT(std::abs(bench.segment()[1].system_time_difference()), 30);
+}
+
+TEST(DistributedClock, a_zero_at_the_start_does_not_make_it_slew_once_the_loop_is_reset) {
+  WireBench bench;
+  SubDeviceConfig config;
+  config.clock.initial_local = Nanoseconds{1'000'000'000'000};
+  bench.add({}, 0, config);
+  bench.write({kBwr, 0, reg::kSystemTime}, std::uint64_t{0});
+  bench.write({kBwr, 0, reg::kSystemTime}, std::uint64_t{0});
+  bench.write({kBwr, 0, reg::kSpeedCounterStart}, std::uint16_t{0x1000});
+  EXPECT_EQ(bench.segment()[0].system_time_difference(), 0);
+  const Duration before = bench.segment()[0].dc().local_time(bench.now());
+  bench.wait(Nanoseconds{1'000'000'000});
+  EXPECT_EQ(bench.segment()[0].dc().local_time(bench.now()) - before,
+            Duration{Nanoseconds{1'000'000'000}});
+}
+
+TEST(DistributedClock, the_speed_counter_tells_the_deviation_by_its_formula) {
+  WireBench bench;
+  bench.add({}, 0);
+  bench.add({.parent = 0}, 80);
+  bench.set_step(Nanoseconds{1'000'000});
+  for (int i = 0; i < 2000; ++i) bench.read(Target::at_position(kArmw, 0, reg::kSystemTime), 8);
+  const auto raw = bench.segment()[1].memory().get<std::uint16_t>(reg::kSpeedCounterDifference);
+  const double d = static_cast<std::int16_t>(raw);
+  constexpr double kStart = 0x1000;
+  EXPECT_NEAR(d / (5 * (kStart + d + 2) * (kStart - d + 2)) * 1e6, -80.0, 0.5);
+}
+
+}  // namespace
+}  // namespace ftcs::ethercat
