@@ -17,8 +17,8 @@ constexpr VarianceShape kOverlappingAllan{2, false, true};
 constexpr VarianceShape kModifiedAllan{2, true, true};
 constexpr VarianceShape kOverlappingHadamard{3, false, true};
 
-// allantools 2024.06 edf_greenhall() for N = 1000, m = 10, as published in the tests of the Rust library
-// kshana 0.25.
+// allantools 2024.06 edf_greenhall() for N = 1000, m = 10, as published in the tests of the Rust
+// library kshana 0.25.
 TEST(DegreesOfFreedom, equal_the_figures_of_an_independent_program) {
   EXPECT_NEAR(
       equivalent_degrees_of_freedom(PowerLawNoise::kWhiteFrequency, kModifiedAllan, 10, 1000),

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/report/record_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "ftcs/report/number_format.h"
+
+namespace ftcs {
+namespace {
+
+constexpr double kNanosecond = 1e-9;
+constexpr double kPartPerBillion = 1e-9;
+/// Rates of shorter windows would be hidden in their own noise.
+constexpr std::size_t kRatesInPlot = 1000;
+
+bool is_frequency(const AnalysedRecord& record) {
+  return record.series.kind == RecordKind::kFrequency;
+}
+
+double span_s(const AnalysedRecord& record) {
+  return static_cast<double>(std::max<std::size_t>(record.phase.size(), 1) - 1) *
+         record.series.interval_s;
+}
+
+std::string confidence_text(double confidence) {
+  return fmt::format("{:.1f} %", 100.0 * confidence);
+}
+
+/// The statistics in the order of every list, and their names in JSON.
+struct NamedCurve {
+  const char* title;
+  const char* key;
+  const std::vector<StabilityPoint>* points;
+};
+
+std::vector<NamedCurve> curves(const AnalysedRecord& record) {
+  const RecordAnalysis& analysis = record.analysis;
+  return {{"OADEV", "oadev", &analysis.overlapping_allan},
+          {"MDEV", "mdev", &analysis.modified_allan},
+          {"OHDEV", "ohdev", &analysis.overlapping_hadamard},
+          {"TDEV", "tdev", &analysis.time}};
+}
+
+const StabilityPoint* at_factor(const std::vector<StabilityPoint>& points, std::size_t factor) {
+  const auto found = std::find_if(
+      points.begin(), points.end(),
+      [factor](const StabilityPoint& point) { return point.averaging_factor == factor; });
+  return found == points.end() ? nullptr : &*found;
+}
+
+Plot values_plot(const AnalysedRecord& record) {
+  Plot plot;
+  plot.x_label = "time / s";
+  if (is_frequency(record)) {
+    plot.title = "Frequency deviation over time";
+    plot.y_label = "deviation / ppb";
+    plot.series = {
+        trace_series("frequency", record.series.values, record.series.interval_s, kPartPerBillion)};
+    return plot;
+  }
+  const TimeUnit unit = time_unit_for(record.analysis.summary.absolute_percentile_95);
+  const bool offset = record.series.kind == RecordKind::kOffset;
+  plot.title = offset ? "Offset over time" : "Phase over time";
+  plot.y_label = fmt::format("{} / {}", offset ? "offset" : "phase", unit.name);
+  plot.series = {trace_series(offset ? "offset" : "phase", record.phase, record.series.interval_s,
+                              unit.seconds)};
+  return plot;
+}
+
+/// What remains of the phase when the mean frequency is taken off.
+Plot residual_plot(const AnalysedRecord& record) {
+  const LineFit& line = record.analysis.line;
+  std::vector<double> residuals(record.phase.size());
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    residuals[i] = record.phase[i] - line.intercept -
+                   line.slope * record.series.interval_s * static_cast<double>(i);
+  }
+  const TimeUnit unit = time_unit_for(line.residual_rms);
+  Plot plot;
+  plot.title = "Phase without mean frequency";
+  plot.x_label = "time / s";
+  plot.y_label = fmt::format("phase / {}", unit.name);
+  plot.series = {trace_series("residual", residuals, record.series.interval_s, unit.seconds)};
+  plot.note = "A straight line fitted by least squares is taken off.";
+  return plot;
+}
+
+Plot rate_plot(const AnalysedRecord& record) {
+  const std::size_t window = std::max<std::size_t>(record.phase.size() / kRatesInPlot, 1);
+  const double tau_s = static_cast<double>(window) * record.series.interval_s;
+  const auto rates = mean_rates({record.phase, record.series.interval_s}, window);
+  Plot plot;
+  plot.title = "Rate over time";
+  plot.x_label = "time / s";
+  plot.y_label = "rate deviation / ppb";
+  plot.series = {trace_series("rate", rates, tau_s, kPartPerBillion)};
+  plot.note = fmt::format("Change of the time error over {}, divided by it.", seconds_text(tau_s));
+  return plot;
+}
+
+Plot histogram_plot(const AnalysedRecord& record) {
+  Plot plot;
+  plot.title = "Histogram";
+  plot.style = PlotStyle::kFilledSteps;
+  plot.y_label = "samples";
+  double unit = kPartPerBillion;
+  plot.x_label = "deviation / ppb";
+  if (!is_frequency(record)) {
+    const TimeUnit time = time_unit_for(record.analysis.summary.absolute_percentile_95);
+    unit = time.seconds;
+    plot.x_label = fmt::format("time error / {}", time.name);
+  }
+  plot.series = {histogram_series("samples", histogram(record.series.values), unit)};
+  return plot;
+}
+
+Plot deviation_plot(const AnalysedRecord& record) {
+  Plot plot{"Frequency stability",      "tau / s", "deviation", true, true,
+            PlotStyle::kLineWithPoints, {},        ""};
+  for (const NamedCurve& curve : curves(record)) {
+    if (curve.points != &record.analysis.time) {
+      plot.series.push_back(deviation_series(curve.title, *curve.points));
+    }
+  }
+  plot.note = fmt::format("Bands: confidence intervals of {}. NIST SP 1065.",
+                          confidence_text(record.confidence));
+  return plot;
+}
+
+Plot wander_plot(const AnalysedRecord& record) {
+  Plot plot{"Time stability",
+            "tau / s",
+            "TDEV, MTIE / s",
+            true,
+            true,
+            PlotStyle::kLineWithPoints,
+            {},
+            ""};
+  plot.series = {deviation_series("TDEV", record.analysis.time),
+                 mtie_series("MTIE", record.analysis.wander)};
+  plot.series[1].lower = plot.series[1].y;
+  plot.series[1].upper = plot.series[1].y;
+  plot.note = "ITU-T G.810. MTIE is a maximum over this record and has no interval.";
+  return plot;
+}
+
+std::vector<LabelledText> parameters(const AnalysedRecord& record) {
+  std::vector<LabelledText> list = {{"file", record.file},
+                                    {"kind", name(record.series.kind)},
+                                    {"interval", seconds_text(record.series.interval_s, 6)},
+                                    {"confidence", confidence_text(record.confidence)}};
+  for (const std::string& note : record.series.notes) list.emplace_back("reading", note);
+  if (record.series.lines_left_out > 0) {
+    list.emplace_back("lines without an offset", std::to_string(record.series.lines_left_out));
+  }
+  return list;
+}
+
+}  // namespace
+
+AnalysedRecord analyse_series(std::string file, Series series, double confidence) {
+  AnalysedRecord record;
+  record.file = std::move(file);
+  record.series = std::move(series);
+  record.confidence = confidence;
+  record.phase = is_frequency(record)
+                     ? phase_from_frequency(record.series.values, record.series.interval_s)
+                     : record.series.values;
+  record.analysis = analyse_record({record.phase, record.series.interval_s}, confidence);
+  if (is_frequency(record)) record.analysis.summary = summarize(record.series.values);
+  return record;
+}
+
+std::vector<LabelledText> headline_figures(const AnalysedRecord& record) {
+  const Summary& summary = record.analysis.summary;
+  const auto text = [&record](double value) {
+    return is_frequency(record) ? fraction_text(value) : seconds_text(value);
+  };
+  std::vector<LabelledText> figures = {
+      {"samples", fmt::format("{}", record.series.samples)},
+      {"missing", fmt::format("{}", record.series.missing)},
+      {"span", seconds_text(span_s(record))},
+      {"mean", text(summary.moments.mean())},
+      {"standard deviation", text(summary.moments.standard_deviation())},
+      {"RMS", text(summary.moments.rms())},
+      {"95 % of |x|", text(summary.absolute_percentile_95)},
+      {is_frequency(record) ? "max |y|" : "max |TE|", text(summary.moments.max_absolute())},
+      {"mean frequency", fraction_text(record.analysis.line.slope)},
+      {"RMS about the line", seconds_text(record.analysis.line.residual_rms)},
+  };
+  if (!record.analysis.overlapping_allan.empty()) {
+    const StabilityPoint& first = record.analysis.overlapping_allan.front();
+    figures.emplace_back("OADEV at " + seconds_text(first.tau_s), significant(first.deviation));
+    figures.emplace_back("noise at " + seconds_text(first.tau_s), name(first.noise));
+  }
+  return figures;
+}
+
+Table stability_table(const AnalysedRecord& record) {
+  Table table(
+      {"tau / s", "OADEV", "lower", "upper", "MDEV", "OHDEV", "TDEV / s", "MTIE / s", "noise"});
+  const RecordAnalysis& analysis = record.analysis;
+  for (const StabilityPoint& point : analysis.overlapping_allan) {
+    const std::size_t factor = point.averaging_factor;
+    const auto wander =
+        std::find_if(analysis.wander.begin(), analysis.wander.end(),
+                     [factor](const MtiePoint& other) { return other.averaging_factor == factor; });
+    const auto cell = [factor](const std::vector<StabilityPoint>& points) {
+      const StabilityPoint* other = at_factor(points, factor);
+      return Cell::significant(other == nullptr ? kNoFigure : other->deviation);
+    };
+    table.add_row({Cell::significant(point.tau_s), Cell::significant(point.deviation),
+                   Cell::significant(point.lower), Cell::significant(point.upper),
+                   cell(analysis.modified_allan), cell(analysis.overlapping_hadamard),
+                   cell(analysis.time),
+                   Cell::significant(wander == analysis.wander.end() ? kNoFigure : wander->mtie_s),
+                   name(point.noise)});
+  }
+  return table;
+}
+
+Table stability_list(const AnalysedRecord& record) {
+  Table table({"statistic", "tau_s", "value", "lower", "upper", "terms", "noise"});
+  for (const NamedCurve& curve : curves(record)) {
+    for (const StabilityPoint& point : *curve.points) {
+      table.add_row({curve.key, Cell::significant(point.tau_s), Cell::significant(point.deviation),
+                     Cell::significant(point.lower), Cell::significant(point.upper),
+                     Cell::count(point.terms), name(point.noise)});
+    }
+  }
+  for (const MtiePoint& point : record.analysis.wander) {
+    table.add_row({"mtie", Cell::significant(point.tau_s), Cell::significant(point.mtie_s), "", "",
+                   Cell::count(point.windows), ""});
+  }
+  return table;
+}
+
+std::string console_report(const AnalysedRecord& record) {
+  std::string text;
+  for (const auto& [label, value] : parameters(record))
+    text += fmt::format("{}: {}\n", label, value);
+  text += '\n';
+  Table figures({"figure", "value"});
+  for (const auto& [label, value] : headline_figures(record)) figures.add_row({label, value});
+  text += figures.to_text() + '\n' + stability_table(record).to_text();
+  return text + fmt::format("\nlower, upper: interval of {} for OADEV (NIST SP 1065).\n",
+                            confidence_text(record.confidence));
+}
+
+Json json_report(const AnalysedRecord& record) {
+  Json json;
+  json["file"] = record.file;
+  json["kind"] = name(record.series.kind);
+  json["interval_s"] = record.series.interval_s;
+  json["samples"] = record.series.samples;
+  json["missing"] = record.series.missing;
+  json["lines_left_out"] = record.series.lines_left_out;
+  json["notes"] = record.series.notes;
+  json["confidence"] = record.confidence;
+  json["summary"] = is_frequency(record) ? to_json(record.analysis.summary, "ppb", kPartPerBillion)
+                                         : to_json(record.analysis.summary, "ns", kNanosecond);
+  json["mean_frequency"] = record.analysis.line.slope;
+  json["residual_rms_ns"] = record.analysis.line.residual_rms / kNanosecond;
+  for (const NamedCurve& curve : curves(record))
+    json["stability"][curve.key] = to_json(*curve.points);
+  json["mtie"] = to_json(record.analysis.wander);
+  return json;
+}
+
+std::string html_report(const AnalysedRecord& record) {
+  HtmlReport report("Stability of " + record.file,
+                    fmt::format("{} record, {} samples over {}", name(record.series.kind),
+                                record.series.samples, seconds_text(span_s(record))));
+  report.add_figures("Figures", headline_figures(record));
+  report.add_plot(values_plot(record));
+  if (record.series.kind == RecordKind::kPhase) report.add_plot(residual_plot(record));
+  if (!is_frequency(record)) report.add_plot(rate_plot(record));
+  report.add_plot(histogram_plot(record));
+  report.add_plot(deviation_plot(record));
+  report.add_plot(wander_plot(record));
+  report.add_table(
+      "Stability", stability_table(record),
+      "lower, upper: confidence interval of " + confidence_text(record.confidence) + " for OADEV.");
+  report.add_parameters(parameters(record));
+  return report.render();
+}
+
+}  // namespace ftcs
