@@ -5,11 +5,12 @@
 
 namespace ftcs::app {
 
-void Log::write(std::string_view text) {
+void Log::write(LogLevel level, std::string_view text) {
   constexpr std::int64_t kNsPerMs = 1'000'000;
   const std::int64_t ms = kernel_.clock_ns(CLOCK_MONOTONIC) / kNsPerMs;
-  fmt::print(stream_, "ftcs[{}.{:03}]: {}\n", ms / 1000, ms % 1000, text);
-  std::fflush(stream_);  // whoever follows a pipe wants each line at once
+  std::FILE* const stream = level <= LogLevel::kError ? stderr : stream_;
+  fmt::print(stream, "ftcs[{}.{:03}]: {}\n", ms / 1000, ms % 1000, text);
+  std::fflush(stream);  // whoever follows a pipe wants each line at once
 }
 
 }  // namespace ftcs::app

@@ -16,7 +16,7 @@ namespace ftcs::app {
 enum class LogLevel : std::uint8_t { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kDebug = 7 };
 
 /// Lines as parsers of ptp4l's log know them: "ftcs[seconds.milliseconds]: text", seconds of
-/// CLOCK_MONOTONIC.
+/// CLOCK_MONOTONIC. Errors go to standard error.
 class Log {
  public:
   Log(platform::Kernel& kernel, std::FILE* stream, int level)
@@ -26,11 +26,11 @@ class Log {
   void operator()(LogLevel level, fmt::format_string<Arguments...> format,
                   Arguments&&... arguments) {
     if (static_cast<int>(level) > level_) return;
-    write(fmt::format(format, std::forward<Arguments>(arguments)...));
+    write(level, fmt::format(format, std::forward<Arguments>(arguments)...));
   }
 
  private:
-  void write(std::string_view text);
+  void write(LogLevel level, std::string_view text);
 
   platform::Kernel& kernel_;
   std::FILE* stream_;

@@ -152,15 +152,14 @@ Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& ker
 
 int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
   Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
-  Log errors(kernel, stderr, options.log_level);
   auto timestamps = platform::TimestampClock::open(kernel, options.interface, options.timestamps);
   if (!timestamps) {
-    errors(LogLevel::kError, "{}", timestamps.error().message());
+    log(LogLevel::kError, "{}", timestamps.error().message());
     return kRuntimeError;
   }
   const auto identity = port_identity(kernel, options);
   if (!identity) {
-    errors(LogLevel::kError, "{}", identity.error().message());
+    log(LogLevel::kError, "{}", identity.error().message());
     return kRuntimeError;
   }
   if (options.role == Role::kTimeReceiver) {

@@ -12,7 +12,9 @@ namespace ftcs::app {
 namespace {
 
 // ptp4l's "freq": positive when the local clock runs fast, so that it is slowed down.
-double ptp4l_frequency_ppb(const Telemetry& telemetry) { return -telemetry.applied_rate.ppb(); }
+double ptp4l_frequency_ppb(const Telemetry& telemetry) {
+  return 0.0 - telemetry.applied_rate.ppb();
+}
 
 int ptp4l_state(ServoState state) {
   switch (state) {

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// World: configuration files in ptp4l's format; the settings of linuxptp 3.1.1's default.cfg, as
+// names and values.
+#include "apps/ftcs/config_file.h"
+
+#include <gtest/gtest.h>
+
+namespace ftcs::app {
+namespace {
+
+std::string error_of(const char* text) {
+  PtpOptions options;
+  return read_config_text(text, "ptp.conf", options).value_or("");
+}
+
+PtpOptions options_of(const char* text) {
+  PtpOptions options;
+  const auto wrong = read_config_text(text, "ptp.conf", options);
+  EXPECT_EQ(wrong.value_or(""), "");
+  return options;
+}
+
+TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
+  const PtpOptions options = options_of(
+      "[global]\n"
+      "domainNumber\t24\n"
+      "  logSyncInterval   -3  \n"
+      "time_stamping software\r\n"
+      "tx_timestamp_timeout 50\n"
+      "first_step_threshold 0.00002\n"
+      "max_frequency 100000\n"
+      "egressLatency 12\n"
+      "delay_filter_length 4\n"
+      "clock_servo pi\n"
+      "pi_proportional_const 0.7\n"
+      "clockIdentity 001122.fffe.334455\n"
+      "# nothing\n"
+      "\n"
+      "[eth3]\n"
+      "delayAsymmetry -100\n");
+  EXPECT_EQ(options.interface, "eth3");
+  EXPECT_EQ(options.domain, 24);
+  EXPECT_EQ(options.log_sync_interval, -3);
+  EXPECT_EQ(options.timestamps, platform::TimestampMode::kSoftware);
+  EXPECT_EQ(options.socket.tx_timestamp_timeout, Nanoseconds{50'000'000});
+  EXPECT_EQ(options.first_step_threshold, Nanoseconds{20'000});
+  EXPECT_NEAR(options.servo.limits.fastest.ppb(), 100'000.0, 1e-3);
+  EXPECT_EQ(options.egress_latency, Nanoseconds{12});
+  EXPECT_EQ(options.delay_asymmetry, Nanoseconds{-100});
+  EXPECT_EQ(options.servo.two_way.path_delay.filter.length, 4U);
+  EXPECT_EQ(options.servo.kind, ServoKind::kLinuxptpPi);
+  EXPECT_DOUBLE_EQ(options.servo.linuxptp_pi.proportional_const, 0.7);
+  EXPECT_EQ(to_text(*options.clock_identity).view(), "001122.fffe.334455");
+}
+
+TEST(ConfigFile, both_spellings_of_the_roles_are_known) {
+  EXPECT_EQ(options_of("[global]\nmasterOnly 1\n").role, Role::kTimeTransmitter);
+  EXPECT_EQ(options_of("[global]\nserverOnly 1\n").role, Role::kTimeTransmitter);
+  EXPECT_EQ(options_of("[global]\nslaveOnly 1\n").role, Role::kTimeReceiver);
+  EXPECT_EQ(options_of("[global]\nclientOnly 1\n").role, Role::kTimeReceiver);
+  EXPECT_EQ(options_of("[global]\nslaveOnly 0\n").notes.size(), 1U);
+}
+
+TEST(ConfigFile, settings_without_effect_are_accepted_only_with_the_value_that_is_true_anyway) {
+  EXPECT_EQ(error_of("[global]\ntwoStepFlag 1\nhybrid_e2e 0\nuserDescription a b c\n"), "");
+  EXPECT_EQ(error_of("[global]\ntwoStepFlag 0\n"),
+            "ptp.conf:2: twoStepFlag: '0' is not supported, only 1");
+  EXPECT_EQ(error_of("[global]\nclock_type BC\n"),
+            "ptp.conf:2: clock_type: 'BC' is not supported, only OC");
+}
+
+TEST(ConfigFile, every_error_names_file_line_and_setting) {
+  EXPECT_EQ(error_of("[global]\n\n#\ncolour blue\n"), "ptp.conf:4: unknown setting 'colour'");
+  EXPECT_EQ(error_of("[global]\ndomainNumber\n"), "ptp.conf:2: 'domainNumber' has no value");
+  EXPECT_EQ(error_of("[global]\npriority1 256\n"),
+            "ptp.conf:2: priority1: '256': expected an integer from 0 to 255");
+  EXPECT_EQ(error_of("domainNumber 0\n"), "ptp.conf:1: a setting before the first section");
+  EXPECT_EQ(error_of("[global\n"), "ptp.conf:1: a section needs a closing bracket");
+  EXPECT_EQ(error_of("[]\n"), "ptp.conf:1: section '' is not supported");
+  EXPECT_EQ(error_of("[eth0]\n[eth1]"),
+            "ptp.conf:2: a second interface 'eth1': only one port is supported");
+}
+
+TEST(ConfigFile, a_missing_file_is_named) {
+  PtpOptions options;
+  EXPECT_EQ(read_config_file("/nonexistent/ptp.conf", options).value_or(""),
+            "/nonexistent/ptp.conf: No such file or directory");
+}
+
+}  // namespace
+}  // namespace ftcs::app

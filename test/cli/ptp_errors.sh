@@ -1,0 +1,102 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# What a user gets wrong, the program says in one line on standard error, with an exit code of its own: 2 for
+# flags and files, 1 for what the system refuses.
+set -uo pipefail
+
+ftcs=$(realpath "${1:-build/ftcs}")
+folder=$(mktemp -d)
+holder=
+cleanup() {
+  [ -n "$holder" ] && kill "$holder" 2> /dev/null
+  rm -rf "$folder"
+}
+trap cleanup EXIT
+failures=0
+
+expect() {  # exit code, text that the one line must hold, arguments...
+  local code=$1 text=$2 result
+  shift 2
+  timeout 20 "$ftcs" "$@" > "$folder/out" 2> "$folder/err"
+  result=$?
+  if [ "$result" -ne "$code" ] || [ "$(wc -l < "$folder/err")" -ne 1 ] || ! grep -qF -- "$text" "$folder/err"; then
+    echo "FAILED: ftcs $*: exit code $result, expected $code and one line with '$text'; got:"
+    cat "$folder/err"
+    failures=$((failures + 1))
+  fi
+}
+
+config() { printf '%s\n' "$@" > "$folder/ptp.conf"; }
+
+expect 2 "unknown command 'follow'" follow
+expect 2 "subcommand is required"
+expect 2 "--bogus" ptp --bogus
+expect 2 "no interface" ptp
+expect 2 "only one port" ptp -i lo -i eth0
+expect 2 "peer delay mechanism is not supported" ptp -i lo -P
+expect 2 "IEEE 802.3 is not supported" ptp -i lo -2
+expect 2 "UDP/IPv6 is not supported" ptp -i lo -6
+expect 2 "hardware clock is not supported" ptp -i lo -p /dev/ptp0
+expect 2 "only virtual" ptp -i lo --clock realtime
+expect 2 "unknown servo 'magic'" ptp -i lo --servo magic
+expect 2 "offset gain must lie between 0 and 1" ptp -i lo --offset-gain 2
+expect 2 "is no band" ptp -i lo --converged-band 5us:1us
+expect 2 "'1' is no time" ptp -i lo --offset 1
+expect 2 "'50' is no rate" ptp -i lo --skew 50
+expect 2 "greater than zero" ptp -i lo --max-frequency -1ppm
+expect 2 "not an IPv4 address" ptp -i lo --unicast somewhere
+expect 2 "must differ" ptp -i lo --event-port 4000 --general-port 4000
+expect 2 "--role" ptp -i lo --role grandmaster
+expect 2 "-s asks for a time receiver" ptp -i lo -s --role time-transmitter
+expect 2 "domainNumber: '256': expected an integer from 0 to 255" ptp -i lo --domainNumber 256
+expect 2 "'L2' is not supported, only UDPv4" ptp -i lo --network_transport L2
+expect 2 "excludes" ptp -i lo -H -S
+expect 2 "$folder/none.conf: No such file" ptp -f "$folder/none.conf"
+
+config "[global]" "domainNumber 0" "colour blue"
+expect 2 "ptp.conf:3: unknown setting 'colour'" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "" "# a comment" "delay_mechanism P2P"
+expect 2 "ptp.conf:4: delay_mechanism: 'P2P' is not supported, only E2E" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "logSyncInterval zero"
+expect 2 "ptp.conf:2: logSyncInterval" ptp -i lo -f "$folder/ptp.conf"
+config "domainNumber 0"
+expect 2 "ptp.conf:1: a setting before the first section" ptp -i lo -f "$folder/ptp.conf"
+config "[eth0]" "[eth1]"
+expect 2 "ptp.conf:2: a second interface 'eth1'" ptp -f "$folder/ptp.conf"
+config "[unicast_master_table]"
+expect 2 "ptp.conf:1: section 'unicast_master_table' is not supported" ptp -i lo -f "$folder/ptp.conf"
+
+expect 1 "interface nosuch0: no such device" ptp -i nosuch0
+expect 1 "hardware time stamping on lo" ptp -i lo -H
+
+# A port that another program holds: a unicast port belongs to one.
+ports=(--event-port $((20000 + $$ % 10000)) --general-port $((30000 + $$ % 10000)))
+"$ftcs" ptp -i lo "${ports[@]}" --unicast 127.0.0.1 > /dev/null 2>&1 &
+holder=$!
+sleep 0.5
+expect 1 "already in use by another program" ptp -i lo "${ports[@]}" --unicast 127.0.0.1
+kill -TERM "$holder"
+wait "$holder"
+code=$?
+if [ "$code" -ne 3 ]; then
+  echo "FAILED: SIGTERM: exit code $code, expected 3 (stopped, not locked)"
+  failures=$((failures + 1))
+fi
+holder=
+
+# Ports below 1024 without the right to them (where nobody needs a right, there is nothing to see).
+privileged=$(cat /proc/sys/net/ipv4/ip_unprivileged_port_start 2> /dev/null || echo 1024)
+if [ "$(id -u)" -eq 0 ] && [ "$privileged" -gt 320 ] && command -v setpriv > /dev/null; then
+  cp "$ftcs" "$folder/ftcs" && chmod 755 "$folder" "$folder/ftcs"
+  timeout 20 setpriv --reuid=65534 --clear-groups --bounding-set=-all --inh-caps=-all \
+    "$folder/ftcs" ptp -i lo > "$folder/out" 2> "$folder/err"
+  code=$?
+  if [ "$code" -ne 1 ] || ! grep -q "UDP port 319: not permitted" "$folder/err"; then
+    echo "FAILED: port 319 as nobody: exit code $code:"
+    cat "$folder/err"
+    failures=$((failures + 1))
+  fi
+fi
+
+[ "$failures" -eq 0 ] && echo "all errors are as documented"
+exit "$failures"

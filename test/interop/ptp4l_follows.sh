@@ -1,0 +1,45 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# Debian's ptp4l (free_running, so it steers nothing) takes our time transmitter's messages over veth: an offset
+# each interval, no fault, and the rate error that our clock was given.
+#
+# test/interop/ptp4l_follows.sh [build/ftcs] [SECONDS]
+. "$(dirname "$0")/common.sh"
+ftcs=$(realpath "${1:-build/ftcs}")
+duration=${2:-12}
+skew_ppb=5000
+require ip ptp4l tshark python3
+make_network
+# A free-running ptp4l prints once per freq_est_interval, which cannot be shorter than a second.
+start_ptp4l receiver "slaveOnly 1" "logSyncInterval -2" "freq_est_interval 0" "summary_interval -2"
+start_capture
+
+clocks() { python3 -c 'import time; print(time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW), time.clock_gettime_ns(time.CLOCK_REALTIME))'; }
+before=$(clocks)
+code=0
+ip netns exec "$ours" "$ftcs" ptp -i "$our_interface" --role time-transmitter --skew ${skew_ppb}ppb \
+  --time_stamping software --tx_timestamp_timeout 50 --logAnnounceInterval -1 --logSyncInterval -2 \
+  --logMinDelayReqInterval -2 --duration "$duration" > "$folder/transmitter.log" 2> "$folder/errors.log" || code=$?
+after=$(clocks)
+cat "$folder/transmitter.log"
+[ "$code" -eq 0 ] || fail "exit code $code"
+[ -s "$folder/errors.log" ] && fail "error lines"
+grep -qE "no transmit timestamp|FAULTY" "$folder/transmitter.log" && fail "fault lines"
+grep -qE "FAULT|timed out|bad message|ignoring" "$folder/receiver.log" && fail "ptp4l reports a fault"
+
+samples=$(grep -c "master offset" "$folder/receiver.log" || true)
+[ "$samples" -ge $(((duration - 6) * 8 / 10)) ] || fail "ptp4l printed only $samples offsets in $duration s"
+
+# The median slope between two offsets: a delayed packet cannot tilt it. ptp4l's clock is CLOCK_REALTIME and ours
+# CLOCK_MONOTONIC_RAW plus the skew, so that the kernel's own correction of REALTIME, measured meanwhile, counts too.
+sed -n 's/^ptp4l\[\([0-9.]*\)\]: master offset *\(-\{0,1\}[0-9]*\) .*/\1 \2/p' "$folder/receiver.log" \
+  | awk '{ for (i = 0; i < NR - 1; i++) if ($1 > x[i]) printf "%.3f\n", ($2 - y[i]) / ($1 - x[i])
+           x[NR - 1] = $1; y[NR - 1] = $2 }' | sort -g > "$folder/slopes"
+slope=$(sed -n "$(($(wc -l < "$folder/slopes") / 2 + 1))p" "$folder/slopes")
+echo "$before $after $slope" | awk -v skew=$skew_ppb -v samples="$samples" '{
+    expected = (($4 - $2) - ($3 - $1)) / ($3 - $1) * 1e9 - skew
+    printf "%d offsets; slope %.0f ppb, expected %.0f ppb\n", samples, $5, expected
+    tolerance = 2000  # offsets scatter by microseconds over seconds
+    exit !($5 - expected < tolerance && expected - $5 < tolerance)
+  }' || fail "ptp4l sees another rate than our clock has"
+check_capture

@@ -1,0 +1,63 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# Runs the unmodified program inside clknetsim (https://github.com/mlichvar/clknetsim): its time receiver follows
+# ptp4l's time transmitter, with simulated hardware and with software timestamps.
+#
+# CLKNETSIM_PATH=folder with clknetsim and clknetsim.so   test/peer/clknetsim_ptp.sh [build/ftcs]
+# Skipped (77) without it. It is GPL and never part of this project: a separate program.
+set -euo pipefail
+
+ftcs=$(realpath "${1:-build/ftcs}")
+seconds=${SECONDS_SIMULATED:-300}
+
+skip() { echo "skipped: $*"; exit 77; }
+[ -n "${CLKNETSIM_PATH:-}" ] || skip "CLKNETSIM_PATH names no clknetsim"
+[ -x "$CLKNETSIM_PATH/clknetsim" ] || skip "$CLKNETSIM_PATH holds no clknetsim"
+ptp4l=$(command -v ptp4l || echo /usr/sbin/ptp4l)
+[ -x "$ptp4l" ] || skip "no ptp4l"
+
+folder=$(mktemp -d)
+pids=()
+cleanup() {
+  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null || true; done
+  rm -rf "$folder"
+}
+trap cleanup EXIT
+
+start_node() {  # number, program and its arguments
+  local node=$1
+  shift
+  LD_PRELOAD=$CLKNETSIM_PATH/clknetsim.so CLKNETSIM_NODE=$node CLKNETSIM_SOCKET=$folder/sock \
+    "$@" > "$folder/log.$node" 2>&1 &
+  pids+=($!)
+}
+
+run() {  # kind of time stamping
+  local kind=$1 result
+  # Node 2 starts 10 ms away, 20 ppm fast; every message takes 10 us and some exponentially distributed jitter.
+  cat > "$folder/conf" << EOF
+node2_offset = 0.01
+node2_freq = 20e-6
+node1_delay2 = (+ 10e-6 (* 1e-7 (exponential)))
+node2_delay1 = (+ 10e-6 (* 1e-7 (exponential)))
+EOF
+  cat > "$folder/transmitter.conf" << EOF
+[global]
+free_running 1
+logSyncInterval -3
+logMinDelayReqInterval -3
+EOF
+  pids=()
+  start_node 1 "$ptp4l" -f "$folder/transmitter.conf" -i eth0 -m -q
+  start_node 2 "$ftcs" ptp -i eth0 --time_stamping "$kind" --summary_interval -7
+  "$CLKNETSIM_PATH/clknetsim" -s "$folder/sock" -l "$seconds" "$folder/conf" 2 \
+    > "$folder/stats" 2> "$folder/log" || { cat "$folder/log" "$folder"/log.*; return 1; }
+  wait "${pids[1]}" && result=0 || result=$?
+  echo "== $kind time stamping: exit code $result"
+  grep -v "master offset" "$folder/log.2" || true
+  grep "master offset" "$folder/log.2" | tail -3
+  [ "$result" -eq 0 ]
+}
+
+run software
+run hardware
