@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+//
+// The world: receiver_fixture.h. Each test of a mishap names its counter and shows the reaction.
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/ptp/receiver_fixture.h"
+
+namespace ftcs::ptp::receiver_test {
+namespace {
+
+// Order and loss.
+
+TEST_F(Receiver, follow_up_before_sync_is_kept) {
+  select_a();
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(3, 1s), 1s)).empty());
+  EXPECT_EQ(of<EmitPair>(event(sync_from(kA, 3), 1s + kDelay)).size(), 1U);
+}
+
+TEST_F(Receiver, lost_follow_up_is_counted_and_harms_nothing) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  EXPECT_EQ(of<EmitPair>(exchange(2, 1125ms)).size(), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(3, 2500ms)).size(), 1U);
+  EXPECT_EQ(count(Counter::kLostFollowUp), 1U);
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(1, 1s), 2600ms)).empty()) << "too late";
+  EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
+}
+
+TEST_F(Receiver, lost_sync_is_counted_and_its_follow_up_forgotten) {
+  select_a();
+  static_cast<void>(exchange(1, 1s));
+  static_cast<void>(general(follow_up(2, 1125ms), 1125ms));
+  EXPECT_EQ(of<EmitPair>(exchange(3, 1250ms)).size(), 1U);
+  EXPECT_EQ(count(Counter::kMissedSync), 1U);
+  static_cast<void>(exchange(4, 2500ms));
+  EXPECT_EQ(count(Counter::kLostSync), 1U);
+}
+
+TEST_F(Receiver, duplicates_are_dropped) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  static_cast<void>(event(sync_from(kA, 1), 1s + 50us));
+  EXPECT_EQ(count(Counter::kDuplicateSync), 1U);
+  const auto pairs = of<EmitPair>(general(follow_up(1, 1s), 1s + 60us));
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_EQ(pairs[0].pair.free_running, local(1s)) << "the first copy counts";
+  EXPECT_TRUE(general(follow_up(1, 1s), 1s + 70us).empty());
+  EXPECT_EQ(count(Counter::kDuplicateFollowUp), 1U);
+  EXPECT_TRUE(of<EmitPair>(event(sync_from(kA, 1), 1s + 80us)).empty());
+  EXPECT_EQ(count(Counter::kDuplicateSync), 2U);
+}
+
+TEST_F(Receiver, syncs_older_than_the_newest_are_dropped) {
+  select_a();
+  static_cast<void>(exchange(5, 1s));
+  static_cast<void>(event(sync_from(kA, 4), 1s + 1ms));
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(4, 875ms), 1s + 1ms)).empty());
+  EXPECT_EQ(count(Counter::kStaleSync), 1U);
+  EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
+}
+
+TEST_F(Receiver, pairs_never_go_back_in_sequence) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  static_cast<void>(event(sync_from(kA, 2), 1125ms));
+  EXPECT_EQ(of<EmitPair>(general(follow_up(2, 1125ms), 1200ms)).size(), 1U);
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(1, 1s), 1201ms)).empty());
+  EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
+}
+
+TEST_F(Receiver, sequence_ids_wrap) {
+  select_a();
+  EXPECT_EQ(of<EmitPair>(exchange(65535, 1s)).size(), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(0, 1125ms)).size(), 1U);
+  EXPECT_EQ(count(Counter::kMissedSync), 0U);
+  EXPECT_EQ(count(Counter::kSequenceRestarts), 0U);
+}
+
+TEST_F(Receiver, a_transmitter_that_restarts_is_followed_again_at_once) {
+  select_a();
+  static_cast<void>(exchange(5000, 1s));
+  static_cast<void>(event(sync_from(kA, 5001), 1125ms));
+  EXPECT_EQ(of<EmitPair>(exchange(0, 1250ms)).size(), 1U);
+  EXPECT_EQ(count(Counter::kSequenceRestarts), 1U);
+  EXPECT_EQ(count(Counter::kLostFollowUp), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(1, 3s)).size(), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(0, 5s)).size(), 1U)
+      << "after a pause even a near id is a restart";
+}
+
+TEST_F(Receiver, a_request_without_answer_is_counted_and_asked_again) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 0), 1s));
+  auto now = local(1s);
+  for (int i = 0; i < 4; ++i) {
+    static_cast<void>(receiver_.on_general_message(bytes_of(announce_from(kA)).view(), now));
+    now = *receiver_.deadline();
+    static_cast<void>(receiver_.on_timer(now));
+  }
+  EXPECT_EQ(count(Counter::kLostDelayResp), 1U);
+  EXPECT_EQ(count(Counter::kDelayReqSent), 5U);
+}
+
+TEST_F(Receiver, late_and_duplicate_delay_responses_are_dropped) {
+  select_a();
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  EXPECT_EQ(of<EmitPair>(general(delay_resp(id, 1s), 1s)).size(), 1U);
+  EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
+  const auto never_sent = static_cast<std::uint16_t>(id + 1);
+  EXPECT_TRUE(general(delay_resp(never_sent, 1s), 1s).empty());
+  EXPECT_EQ(count(Counter::kStaleDelayResp), 2U);
+}
+
+TEST_F(Receiver, a_missing_transmit_stamp_leaves_the_exchange_out) {
+  select_a();
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  EXPECT_TRUE(receiver_.on_transmit_timestamp_missing(id, local(1s)).empty());
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+  EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
+  EXPECT_TRUE(receiver_.on_transmit_timestamp(id, local(1s), local(1s)).empty());
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
+  EXPECT_TRUE(receiver_.deadline().has_value()) << "the next request comes as planned";
+}
+
+// Messages that are not for us.
+
+TEST_F(Receiver, foreign_domains_and_profiles_are_ignored) {
+  select_a();
+  Message sync = sync_from(kA, 1);
+  sync.header.domain = 1;
+  EXPECT_TRUE(event(sync, 1s).empty());
+  EXPECT_EQ(count(Counter::kWrongDomain), 1U);
+  sync.header.domain = 0;
+  sync.header.major_sdo_id = 1;  // IEEE 802.1AS
+  EXPECT_TRUE(event(sync, 1s).empty());
+  EXPECT_EQ(count(Counter::kWrongSdo), 1U);
+  EXPECT_EQ(count(Counter::kSyncReceived), 0U);
+}
+
+TEST_F(Receiver, only_the_selected_transmitter_is_heard) {
+  select_a();
+  EXPECT_TRUE(event(sync_from(kB, 1), 1s).empty());
+  EXPECT_TRUE(general(message_from(kB, 1, FollowUp{reference(1s)}), 1s).empty());
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  EXPECT_TRUE(general(message_from(kB, id, DelayResp{reference(1s), kUs}), 1s).empty());
+  EXPECT_EQ(count(Counter::kWrongTransmitter), 3U);
+}
+
+TEST_F(Receiver, responses_to_other_receivers_are_ignored) {
+  select_a();
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  EXPECT_TRUE(general(message_from(kA, id, DelayResp{reference(1s), kOther}), 1s).empty());
+  EXPECT_EQ(count(Counter::kWrongRequestingPort), 1U);
+  EXPECT_EQ(of<EmitPair>(general(delay_resp(id, 1s), 1s)).size(), 1U) << "ours is still open";
+}
+
+TEST_F(Receiver, syncs_before_a_transmitter_is_selected_are_ignored) {
+  EXPECT_TRUE(event(sync_from(kA, 1), 1s).empty());
+  EXPECT_EQ(count(Counter::kNotListening), 1U);
+}
+
+TEST_F(Receiver, other_roles_messages_are_recognised_and_left_alone) {
+  select_a();
+  EXPECT_TRUE(event(message_from(kOther, 1, DelayReq{}), 1s).empty());
+  EXPECT_TRUE(event(message_from(kUs, 1, DelayReq{}), 1s).empty());
+  EXPECT_TRUE(event(message_from(kA, 1, PdelayReq{}), 1s).empty());
+  EXPECT_TRUE(event(message_from(kA, 1, PdelayResp{}), 1s).empty());
+  EXPECT_TRUE(general(message_from(kA, 1, PdelayRespFollowUp{}), 1s).empty());
+  EXPECT_TRUE(general(message_from(kA, 1, Signaling{}), 1s).empty());
+  EXPECT_TRUE(general(message_from(kA, 1, Management{}), 1s).empty());
+  EXPECT_TRUE(general(sync_from(kA, 1), 1s).empty()) << "no receive stamp on the general port";
+  Message alternate = announce_from(kB);
+  alternate.header.flags = flag::kAlternateTransmitter;
+  EXPECT_TRUE(general(alternate, 1s).empty());
+  EXPECT_EQ(count(Counter::kNotForThisRole), 1U);
+  EXPECT_EQ(count(Counter::kOwnMessage), 1U);
+  EXPECT_EQ(count(Counter::kPdelayIgnored), 3U);
+  EXPECT_EQ(count(Counter::kSignalingIgnored), 1U);
+  EXPECT_EQ(count(Counter::kManagementIgnored), 1U);
+  EXPECT_EQ(count(Counter::kWrongChannel), 1U);
+  EXPECT_EQ(count(Counter::kAlternateTransmitter), 1U);
+}
+
+// Messages that are broken.
+
+TEST_F(Receiver, each_kind_of_broken_message_has_its_counter_and_no_effect) {
+  select_a();
+  const auto bytes = bytes_of(follow_up(1, 1s));
+  const std::vector<std::uint8_t> good(bytes.view().begin(), bytes.view().end());
+  const auto broken = [&](std::size_t offset, std::uint8_t value) {
+    auto octets = good;
+    octets[offset] = value;
+    return octets;
+  };
+  auto oversized = good;
+  oversized.resize(kMaximumMessageSize + 1);
+  auto with_tlv = good;
+  with_tlv.insert(with_tlv.end(), {0, 8, 0, 9, 1, 2});
+  with_tlv[3] = static_cast<std::uint8_t>(with_tlv.size());
+  const struct {
+    std::vector<std::uint8_t> octets;
+    Counter counter;
+  } kCases[] = {{{}, Counter::kTruncated},
+                {{good.begin(), good.begin() + 43}, Counter::kTruncated},
+                {oversized, Counter::kOversized},
+                {broken(1, 0x11), Counter::kWrongVersion},
+                {broken(0, 0x07), Counter::kUnknownType},
+                {broken(3, 43), Counter::kWrongLength},
+                {broken(34, 0xFF), Counter::kBadTimestamp},
+                {broken(40, 0xFF), Counter::kBadTimestamp},
+                {with_tlv, Counter::kMalformedTlv}};
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  for (const auto& one : kCases) {
+    const auto before = count(one.counter);
+    EXPECT_TRUE(general(one.octets, 1s).empty());
+    EXPECT_EQ(count(one.counter), before + 1) << to_string(one.counter);
+  }
+  EXPECT_EQ(of<EmitPair>(general(good, 1s)).size(), 1U) << "the good one is still awaited";
+}
+
+// Values.
+
+TEST_F(Receiver, small_negative_corrections_are_used_and_counted) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  Message follow = follow_up(1, 1s);
+  follow.header.correction = Duration{-20ns};
+  const auto pairs = of<EmitPair>(general(follow, 1s));
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_EQ(pairs[0].pair.reference, reference(1s) - Duration{20ns});
+  EXPECT_EQ(count(Counter::kNegativeCorrection), 1U);
+}
+
+TEST_F(Receiver, corrections_of_more_than_a_second_are_refused) {
+  select_a();
+  for (const Duration absurd :
+       {Duration{1s + 1ns}, Duration{-1s - 1ns}, Duration{39h}, Duration{-39h}}) {
+    const auto before = count(Counter::kAbsurdCorrection);
+    Message sync = sync_from(kA, 1);
+    sync.header.correction = absurd;
+    EXPECT_TRUE(event(sync, 1s).empty());
+    Message follow = follow_up(1, 1s);
+    follow.header.correction = absurd;
+    EXPECT_TRUE(general(follow, 1s).empty());
+    Message response = delay_resp(0, 1s);
+    response.header.correction = absurd;
+    EXPECT_TRUE(general(response, 1s).empty());
+    EXPECT_EQ(count(Counter::kAbsurdCorrection), before + 3);
+  }
+  Message sync = message_from(kA, 1, Sync{reference(1s)});
+  sync.header.correction = Duration{1s};
+  EXPECT_EQ(of<EmitPair>(event(sync, 1s)).size(), 1U) << "the limit itself is allowed";
+}
+
+TEST_F(Receiver, a_jump_of_the_reference_is_reported_and_open_requests_are_forgotten) {
+  select_a();
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  static_cast<void>(general(follow_up(0, 1s), 1s));
+  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  static_cast<void>(event(sync_from(kA, 1), 1125ms));
+  const auto actions = general(follow_up(1, 2125ms), 1125ms);
+  ASSERT_EQ(of<ReferenceJumped>(actions).size(), 1U);
+  EXPECT_EQ(of<ReferenceJumped>(actions)[0].jump, Duration{1s});
+  ASSERT_EQ(of<EmitPair>(actions).size(), 1U) << "the pair tells the truth: the servo decides";
+  EXPECT_TRUE(std::holds_alternative<ReferenceJumped>(actions[0])) << "the news comes first";
+  EXPECT_EQ(count(Counter::kReferenceJumps), 1U);
+  EXPECT_TRUE(of<EmitPair>(general(delay_resp(id, 2126ms), 1126ms)).empty());
+  EXPECT_EQ(count(Counter::kStaleDelayResp), 1U);
+  EXPECT_EQ(of<SendMessage>(receiver_.on_timer(local(1126ms))).size(), 1U) << "asked again at once";
+
+  static_cast<void>(event(sync_from(kA, 2), 1250ms));
+  EXPECT_TRUE(of<ReferenceJumped>(general(follow_up(2, 2250ms), 1250ms)).empty()) << "told once";
+  static_cast<void>(event(sync_from(kA, 3), 1375ms));
+  const auto back = of<ReferenceJumped>(general(follow_up(3, 1375ms), 1375ms));
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].jump, Duration{-1s});
+}
+
+}  // namespace
+}  // namespace ftcs::ptp::receiver_test

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+//
+// The world: receiver_fixture.h. Transmitters that come, go, improve and change.
+#include <gtest/gtest.h>
+
+#include "ftcs/ptp/receiver_fixture.h"
+
+namespace ftcs::ptp::receiver_test {
+namespace {
+
+TEST_F(Receiver, a_transmitter_that_stops_is_given_up_after_three_of_its_intervals) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 0), 300ms));
+  static_cast<void>(receiver_.on_timer(local(3249ms)));
+  EXPECT_NE(receiver_.transmitter(), nullptr);
+  const auto actions = receiver_.on_timer(local(3250ms));  // last Announce at 250 ms
+  ASSERT_EQ(of<PortStateChanged>(actions).size(), 1U);
+  EXPECT_EQ(of<PortStateChanged>(actions)[0].event, PortEvent::kAnnounceReceiptTimeoutExpires);
+  EXPECT_EQ(receiver_.transmitter(), nullptr);
+  EXPECT_FALSE(receiver_.deadline().has_value()) << "no request to nobody";
+  EXPECT_EQ(count(Counter::kAnnounceTimeouts), 1U);
+}
+
+TEST_F(Receiver, a_transmitter_that_returns_is_no_new_reference) {
+  select_a();
+  static_cast<void>(receiver_.on_timer(local(4s)));
+  static_cast<void>(general(announce_from(kA), 10s));
+  const auto selected = of<TransmitterSelected>(general(announce_from(kA), 10250ms));
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_FALSE(selected[0].changed);
+}
+
+TEST_F(Receiver, a_better_transmitter_takes_over_and_open_exchanges_do_not_mix) {
+  select_a();
+  static_cast<void>(receiver_.on_servo_locked(local(300ms)));
+  static_cast<void>(event(sync_from(kA, 1), 300ms));
+  static_cast<void>(general(announce_from(kB, 1), 400ms));
+  const auto actions = general(announce_from(kB, 1), 650ms);
+  const auto selected = of<TransmitterSelected>(actions);
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_EQ(selected[0].transmitter.port, kB);
+  EXPECT_TRUE(selected[0].changed);
+  ASSERT_EQ(of<PortStateChanged>(actions).size(), 1U);
+  EXPECT_EQ(receiver_.state(), PortState::kUncalibrated);
+  EXPECT_EQ(count(Counter::kTransmitterChanges), 2U);
+  EXPECT_TRUE(general(message_from(kB, 1, FollowUp{reference(300ms)}), 660ms).empty())
+      << "B's Follow_Up must not meet A's Sync of the same id";
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(1, 300ms), 660ms)).empty());
+}
+
+TEST_F(Receiver, a_transmitter_that_changes_its_identity_is_followed_under_the_new_one) {
+  select_a();
+  for (Nanoseconds at = 500ms; at <= 2500ms; at += 1s) {
+    static_cast<void>(general(announce_from(kB), at));
+  }
+  EXPECT_EQ(receiver_.transmitter()->port, kA) << "A is better by identity and not yet silent";
+  const auto actions = receiver_.on_timer(local(3250ms));
+  ASSERT_EQ(of<TransmitterSelected>(actions).size(), 1U);
+  EXPECT_TRUE(of<TransmitterSelected>(actions)[0].changed);
+  EXPECT_EQ(receiver_.transmitter()->port, kB);
+  EXPECT_EQ(receiver_.state(), PortState::kUncalibrated);
+}
+
+TEST_F(Receiver, a_new_grandmaster_behind_the_same_port_is_another_reference) {
+  select_a();
+  Message announce = announce_from(kA);
+  std::get<Announce>(announce.body).utc_offset = 38;
+  auto selected = of<TransmitterSelected>(general(announce, 500ms));
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_FALSE(selected[0].changed) << "only what it says has changed";
+  std::get<Announce>(announce.body).grandmaster = kB.clock;
+  selected = of<TransmitterSelected>(general(announce, 750ms));
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_TRUE(selected[0].changed);
+}
+
+TEST_F(Receiver, announces_that_went_too_far_or_claim_our_identity_are_refused) {
+  Message announce = announce_from(kA);
+  std::get<Announce>(announce.body).steps_removed = 255;
+  EXPECT_TRUE(general(announce, 0s).empty());
+  std::get<Announce>(announce.body) = Announce{};
+  std::get<Announce>(announce.body).grandmaster = kUs.clock;
+  EXPECT_TRUE(general(announce, 0s).empty());
+  EXPECT_TRUE(general(announce_from({kUs.clock, 2}), 0s).empty());
+  EXPECT_EQ(count(Counter::kUnusableAnnounce), 3U);
+}
+
+TEST_F(Receiver, a_flood_of_identities_does_not_push_the_selected_one_out) {
+  select_a();
+  for (std::uint16_t port = 2; port < 1000; ++port) {
+    static_cast<void>(general(announce_from({kB.clock, port}), 300ms));
+  }
+  EXPECT_EQ(receiver_.transmitter()->port, kA);
+  EXPECT_EQ(count(Counter::kForeignTableFull), 998U - 7U);
+}
+
+TEST_F(Receiver, an_announce_interval_out_of_range_counts_as_the_configured_one) {
+  Message announce = announce_from(kA);
+  announce.header.log_interval = 100;
+  static_cast<void>(general(announce, 0s));
+  static_cast<void>(general(announce, 1s));
+  EXPECT_EQ(count(Counter::kBadInterval), 2U);
+  EXPECT_EQ(receiver_.deadline(), local(1s + 3 * 2s));
+}
+
+}  // namespace
+}  // namespace ftcs::ptp::receiver_test
