@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -20,9 +21,9 @@ bool is_frequency(const AnalysedRecord& record) {
   return record.series.kind == RecordKind::kFrequency;
 }
 
-double span_s(const AnalysedRecord& record) {
-  return static_cast<double>(std::max<std::size_t>(record.phase.size(), 1) - 1) *
-         record.series.interval_s;
+std::string span_text(const AnalysedRecord& record) {
+  const auto steps = static_cast<double>(std::max<std::size_t>(record.phase.size(), 1) - 1);
+  return fmt::format("{:.6g} s", steps * record.series.interval_s);
 }
 
 std::string confidence_text(double confidence) {
@@ -71,19 +72,24 @@ Plot values_plot(const AnalysedRecord& record) {
 }
 
 /// What remains of the phase when the mean frequency is taken off.
-Plot residual_plot(const AnalysedRecord& record) {
+std::vector<double> residuals_of(const AnalysedRecord& record) {
   const LineFit& line = record.analysis.line;
   std::vector<double> residuals(record.phase.size());
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     residuals[i] = record.phase[i] - line.intercept -
                    line.slope * record.series.interval_s * static_cast<double>(i);
   }
-  const TimeUnit unit = time_unit_for(line.residual_rms);
+  return residuals;
+}
+
+Plot residual_plot(const AnalysedRecord& record) {
+  const TimeUnit unit = time_unit_for(record.analysis.line.residual_rms);
   Plot plot;
   plot.title = "Phase without mean frequency";
   plot.x_label = "time / s";
   plot.y_label = fmt::format("phase / {}", unit.name);
-  plot.series = {trace_series("residual", residuals, record.series.interval_s, unit.seconds)};
+  plot.series = {
+      trace_series("residual", residuals_of(record), record.series.interval_s, unit.seconds)};
   plot.note = "A straight line fitted by least squares is taken off.";
   return plot;
 }
@@ -101,19 +107,40 @@ Plot rate_plot(const AnalysedRecord& record) {
   return plot;
 }
 
+/// One start-up transient would squeeze everything else into one bin: what lies beyond the inner 98
+/// % by more than their width is only counted.
+Histogram histogram_of_bulk(const std::vector<double>& values) {
+  const Summary summary = summarize(values);
+  const double width = summary.percentile_99 - summary.percentile_1;
+  std::vector<double> bulk;
+  std::copy_if(
+      values.begin(), values.end(), std::back_inserter(bulk), [&summary, width](double value) {
+        return value >= summary.percentile_1 - width && value <= summary.percentile_99 + width;
+      });
+  const Histogram bins = histogram(bulk);
+  return histogram(values, bins.lower, bins.upper, bins.counts.size());
+}
+
+/// Of the values as recorded; of a phase without its mean frequency, which would be a ramp.
 Plot histogram_plot(const AnalysedRecord& record) {
   Plot plot;
   plot.title = "Histogram";
   plot.style = PlotStyle::kFilledSteps;
   plot.y_label = "samples";
+  const bool phase = record.series.kind == RecordKind::kPhase;
+  const Histogram bins = histogram_of_bulk(phase ? residuals_of(record) : record.series.values);
   double unit = kPartPerBillion;
   plot.x_label = "deviation / ppb";
   if (!is_frequency(record)) {
-    const TimeUnit time = time_unit_for(record.analysis.summary.absolute_percentile_95);
+    const TimeUnit time = time_unit_for(std::max(std::abs(bins.lower), std::abs(bins.upper)));
     unit = time.seconds;
-    plot.x_label = fmt::format("time error / {}", time.name);
+    plot.x_label =
+        fmt::format("{} / {}", phase ? "phase without mean frequency" : "offset", time.name);
   }
-  plot.series = {histogram_series("samples", histogram(record.series.values), unit)};
+  plot.series = {histogram_series("samples", bins, unit)};
+  if (bins.below + bins.above > 0) {
+    plot.note = fmt::format("{} samples lie below, {} above.", bins.below, bins.above);
+  }
   return plot;
 }
 
@@ -182,7 +209,7 @@ std::vector<LabelledText> headline_figures(const AnalysedRecord& record) {
   std::vector<LabelledText> figures = {
       {"samples", fmt::format("{}", record.series.samples)},
       {"missing", fmt::format("{}", record.series.missing)},
-      {"span", seconds_text(span_s(record))},
+      {"span", span_text(record)},
       {"mean", text(summary.moments.mean())},
       {"standard deviation", text(summary.moments.standard_deviation())},
       {"RMS", text(summary.moments.rms())},
@@ -273,7 +300,7 @@ Json json_report(const AnalysedRecord& record) {
 std::string html_report(const AnalysedRecord& record) {
   HtmlReport report("Stability of " + record.file,
                     fmt::format("{} record, {} samples over {}", name(record.series.kind),
-                                record.series.samples, seconds_text(span_s(record))));
+                                record.series.samples, span_text(record)));
   report.add_figures("Figures", headline_figures(record));
   report.add_plot(values_plot(record));
   if (record.series.kind == RecordKind::kPhase) report.add_plot(residual_plot(record));

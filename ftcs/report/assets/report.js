@@ -21,6 +21,33 @@
     return value.toExponential(3).replace(/\.?0+e/, 'e').replace('e+', 'e');
   }
 
+  // Whole decades; between two neighbours also 2 and 5 of each.
+  function decades(low, high) {
+    var ticks = [];
+    var digits = Math.log10(high / low) < 2.5 ? [1, 2, 5] : [1];
+    for (var power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); ++power) {
+      digits.forEach(function (digit) {
+        var v = parseFloat(digit + 'e' + power);
+        if (v >= low && v <= high) ticks.push({ v: v, label: number(v) });
+      });
+    }
+    return ticks;
+  }
+
+  // Room around the outermost points of a logarithmic axis: a factor, as dygraphs pads in pixels of linear ones only.
+  function padded(values) {
+    var positive = values.filter(function (value) { return value > 0; });
+    var low = Math.min.apply(null, positive), high = Math.max.apply(null, positive);
+    var room = Math.max(Math.pow(high / low, 0.04), 1.15);
+    return [low / room, high * room];
+  }
+
+  function all(plot, fields) {
+    return [].concat.apply([], plot.series.map(function (series) {
+      return [].concat.apply([], fields.map(function (field) { return series[field]; }));
+    }));
+  }
+
   function rows(plot) {
     var byX = new Map();
     plot.series.forEach(function (series, column) {
@@ -57,6 +84,14 @@
         y: { axisLabelFormatter: number, valueFormatter: number, axisLabelWidth: 74, pixelsPerLabel: 32 }
       }
     };
+    if (plot.log_x) {
+      options.dateWindow = padded(all(plot, ['x']));
+      options.axes.x.ticker = decades;
+    }
+    if (plot.log_y) {
+      options.valueRange = padded(all(plot, ['y', 'lower', 'upper']));
+      options.axes.y.ticker = decades;
+    }
     Object.assign(options, colours(plot));
     return new Dygraph(document.getElementById('plot' + index), rows(plot), options);
   }
