@@ -62,6 +62,12 @@ class TwoWayServo {
     return config_.fixed_path_delay.has_value() ? Duration{*config_.fixed_path_delay}
                                                 : delay_.path_delay();
   }
+  /// The stamp that the path delay is measured with. Not rate compensated means as linuxptp does it:
+  /// on the steered clock, whatever was done to it in the meantime.
+  [[nodiscard]] FreeRunningTime delay_stamp(const TimestampPair& pair) const noexcept {
+    return config_.path_delay.rate_compensated ? pair.free_running
+                                               : FreeRunningTime{pair.local.since_epoch()};
+  }
   [[nodiscard]] SyncSample sample_of(const TimestampPair& pair) const noexcept {
     return {pair.reference, path_delay(), pair.local, pair.free_running};
   }
@@ -76,7 +82,7 @@ class TwoWayServo {
     }
     const ReferenceTime predicted =
         accepted_.reference +
-        scale(pair.free_running - accepted_.free_running, delay_.rate_ratio());
+        scale(delay_stamp(pair) - delay_stamp(accepted_), delay_.rate_ratio());
     return gate_.decide(predicted - pair.reference);  // positive: arrived late
   }
 
@@ -96,7 +102,7 @@ class TwoWayServo {
     accepted_ = pair;
     has_accepted_ = true;
     const bool was_known = path_delay_known();
-    delay_.on_forward(pair.reference, pair.free_running);
+    delay_.on_forward(pair.reference, delay_stamp(pair));
     if (!path_delay_known()) return {};
     if constexpr (requires { law_.prime(sample_of(previous)); }) {
       if (!was_known && has_previous) law_.prime(sample_of(previous));
@@ -107,7 +113,7 @@ class TwoWayServo {
 
   ServoUpdate on_backward(const TimestampPair& pair) noexcept {
     if (config_.fixed_path_delay.has_value()) return {};
-    const PathDelayUpdate update = delay_.on_backward(pair.free_running, pair.reference);
+    const PathDelayUpdate update = delay_.on_backward(delay_stamp(pair), pair.reference);
     const bool possible = update.verdict != PathDelayVerdict::kNegative &&
                           update.verdict != PathDelayVerdict::kAbsurd;
     return {possible ? SampleVerdict::kUsed : SampleVerdict::kImplausible, false, {}};
