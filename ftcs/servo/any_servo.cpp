@@ -21,6 +21,15 @@ AdaptiveConfig with_common(AdaptiveConfig servo, const ServoConfig& common) noex
   return servo;
 }
 
+KalmanConfig with_common(KalmanConfig servo, const ServoConfig& common) noexcept {
+  if (common.sync_interval != Nanoseconds{0}) servo.sync_interval = common.sync_interval;
+  if (!servo.fixed_path_delay.has_value()) {
+    servo.fixed_path_delay = common.two_way.fixed_path_delay;
+  }
+  servo.limits = intersect(servo.limits, common.limits);
+  return servo;
+}
+
 }  // namespace
 
 std::string_view servo_kind_name(ServoKind kind) noexcept {
@@ -50,6 +59,14 @@ std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
       return validate(config.free_running);
     case ServoKind::kAdaptive:
       return validate(with_common(config.adaptive, config));
+    case ServoKind::kRegression:
+      return validate(with_common(config.regression, config));
+    case ServoKind::kPid:
+      return validate(with_common(config.pid, config));
+    case ServoKind::kFrequencyCompensated:
+      return validate(with_common(config.frequency_compensated, config));
+    case ServoKind::kKalman:
+      return validate(with_common(config.kalman, config));
   }
   return std::nullopt;
 }
@@ -68,6 +85,17 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
                       with_common(config.linuxptp_pi, config)};
     case ServoKind::kAdaptive:
       return AnyServo{std::in_place_type<AdaptiveServo>, with_common(config.adaptive, config)};
+    case ServoKind::kRegression:
+      return AnyServo{std::in_place_type<TwoWayServo<RegressionServo>>, two_way,
+                      with_common(config.regression, config)};
+    case ServoKind::kPid:
+      return AnyServo{std::in_place_type<TwoWayServo<PidServo>>, two_way,
+                      with_common(config.pid, config)};
+    case ServoKind::kFrequencyCompensated:
+      return AnyServo{std::in_place_type<TwoWayServo<FrequencyCompensatedServo>>, two_way,
+                      with_common(config.frequency_compensated, config)};
+    case ServoKind::kKalman:
+      return AnyServo{std::in_place_type<KalmanServo>, with_common(config.kalman, config)};
     case ServoKind::kFreeRunning:
       break;
   }

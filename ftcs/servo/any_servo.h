@@ -8,6 +8,10 @@
 #include <variant>
 
 #include "ftcs/servo/adaptive/adaptive_servo.h"
+#include "ftcs/servo/baseline/frequency_compensated_servo.h"
+#include "ftcs/servo/baseline/kalman_servo.h"
+#include "ftcs/servo/baseline/pid_servo.h"
+#include "ftcs/servo/baseline/regression_servo.h"
 #include "ftcs/servo/free_running_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/linuxptp_pi_servo.h"
@@ -21,7 +25,18 @@ namespace ftcs {
 // A further servo needs one line in each of: ServoKind, kServoKinds, ServoConfig, AnyServo::Variant
 // and, in any_servo.cpp, make_servo and validate.
 
-enum class ServoKind : std::uint8_t { kFtcs, kPics, kLinuxptpPi, kFreeRunning, kAdaptive };
+/// The last four are baselines for comparison.
+enum class ServoKind : std::uint8_t {
+  kFtcs,
+  kPics,
+  kLinuxptpPi,
+  kFreeRunning,
+  kAdaptive,
+  kRegression,
+  kPid,
+  kFrequencyCompensated,
+  kKalman,
+};
 
 struct ServoKindName {
   ServoKind kind;
@@ -32,7 +47,9 @@ struct ServoKindName {
 inline constexpr ServoKindName kServoKinds[] = {
     {ServoKind::kAdaptive, "adaptive"}, {ServoKind::kFtcs, "ftcs"},
     {ServoKind::kPics, "pics"},         {ServoKind::kLinuxptpPi, "linuxptp-pi"},
-    {ServoKind::kFreeRunning, "none"},
+    {ServoKind::kFreeRunning, "none"},  {ServoKind::kRegression, "regression"},
+    {ServoKind::kPid, "pid"},           {ServoKind::kFrequencyCompensated, "frequency-compensated"},
+    {ServoKind::kKalman, "kalman"},
 };
 
 [[nodiscard]] std::string_view servo_kind_name(ServoKind kind) noexcept;
@@ -51,6 +68,10 @@ struct ServoConfig {
   LinuxptpPiConfig linuxptp_pi{};
   FreeRunningConfig free_running{};
   AdaptiveConfig adaptive{};
+  RegressionConfig regression{};
+  PidConfig pid{};
+  FrequencyCompensatedConfig frequency_compensated{};
+  KalmanConfig kalman{};
 };
 
 /// Of the chosen kind only.
@@ -61,7 +82,8 @@ class AnyServo {
  public:
   using Variant =
       std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>, TwoWayServo<LinuxptpPiServo>,
-                   TwoWayServo<FreeRunningServo>, AdaptiveServo>;
+                   TwoWayServo<FreeRunningServo>, AdaptiveServo, TwoWayServo<RegressionServo>,
+                   TwoWayServo<PidServo>, TwoWayServo<FrequencyCompensatedServo>, KalmanServo>;
 
   /// In place: the adaptive servo is too large to pass through the stack of a real-time thread.
   template <class Servo, class... Configs>

@@ -60,7 +60,8 @@ TEST(AnyServo, every_kind_but_none_brings_the_clock_to_the_reference) {
     if (entry.kind == ServoKind::kFreeRunning) {
       EXPECT_EQ(commands, 0);
     } else {
-      EXPECT_GE(commands, 198) << entry.name;
+      // The regression needs four samples for its first line, the others two.
+      EXPECT_GE(commands, entry.kind == ServoKind::kRegression ? 196 : 198) << entry.name;
       EXPECT_NEAR(plant.offset_ns(), 0.0, 1.0) << entry.name;
     }
     EXPECT_NEAR(servo.snapshot().rate_ratio.ppm(), -50.0, 0.1) << entry.name;

@@ -17,6 +17,7 @@ enum class ServoConfigError : std::uint8_t {
   kProportionalGain,
   kIntegralGain,
   kStepThreshold,
+  kNoise,
   kActuator,
 };
 
@@ -39,6 +40,8 @@ enum class ServoConfigError : std::uint8_t {
       return "the proportional gain must be finite and not negative";
     case ServoConfigError::kIntegralGain:
       return "the integral gain must be finite and not negative";
+    case ServoConfigError::kNoise:
+      return "the noise of a Kalman filter must be finite, that of timestamps above zero";
     case ServoConfigError::kStepThreshold:
       return "a step threshold must not be negative";
     case ServoConfigError::kActuator:

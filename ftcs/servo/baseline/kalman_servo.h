@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include "ftcs/servo/adaptive/steering.h"
+#include "ftcs/servo/baseline/kalman_filter.h"
+#include "ftcs/servo/servo.h"
+#include "ftcs/servo/servo_config_error.h"
+
+namespace ftcs {
+
+struct KalmanConfig {
+  Nanoseconds sync_interval{0};  ///< zero: one second
+  baseline::KalmanNoise noise{};
+  std::optional<Nanoseconds> fixed_path_delay{};  ///< known otherwise: the two-state filter
+  /// T_c as a part of the sync interval.
+  double correction_share = 0.25;
+  RateLimits limits{};
+};
+
+[[nodiscard]] std::optional<ServoConfigError> validate(const KalmanConfig& config) noexcept;
+
+/// Baseline: a Kalman filter of fixed noise (Giorgi and Narduzzi [24]) with deadbeat steering.
+/// Three states (offset, rate, path delay) from both directions, or two with a known path delay.
+/// Given the true noise of a linear world it is the bound that no servo can beat there.
+class KalmanServo {
+ public:
+  using Config = KalmanConfig;
+
+  explicit KalmanServo(const KalmanConfig& config = {}) noexcept;
+
+  ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
+  void reset() noexcept { *this = KalmanServo(config_); }
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
+
+ private:
+  [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
+  void observe(const TimestampPair& pair) noexcept;
+  [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
+
+  KalmanConfig config_;
+  baseline::KalmanFilter filter_;
+  adaptive::Steering steering_;
+  double known_delay_ns_ = 0.0;
+  unsigned messages_ = 0;
+  Duration base_{};        ///< first free running minus reference: keeps the states small
+  ReferenceTime event_{};  ///< reference time of the last event at the local clock
+  TimestampPair latest_[2] = {};
+  bool has_latest_[2] = {};
+  ServoSnapshot snapshot_{};
+};
+
+static_assert(ClockServo<KalmanServo>);
+
+}  // namespace ftcs
