@@ -39,11 +39,7 @@ class FieldReader {
     }
     return {};
   }
-  ClockIdentity clock_identity() noexcept {
-    ClockIdentity identity;
-    for (auto& octet : identity.octets) octet = bytes_.read<std::uint8_t>();
-    return identity;
-  }
+  ClockIdentity clock_identity() noexcept { return {bytes_.read_octets<8>()}; }
   PortIdentity port_identity() noexcept {
     PortIdentity identity{clock_identity()};
     identity.port = bytes_.read<std::uint16_t>();
