@@ -19,15 +19,18 @@ struct NoiseModel {
 /// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
 /// a^(1/2). The last three are jumps: of the offset by some and by many sigma, of the path delay.
 struct FullGrid {
-  static constexpr std::size_t kSize = 23;
+  static constexpr std::size_t kSize = 32;
   static constexpr std::size_t kJumps = 3;
-  static constexpr std::size_t kStart = 10;  ///< the model that is believed before any evidence
+  static constexpr std::size_t kStart = 13;  ///< the model that is believed before any evidence
   static constexpr std::array<NoiseModel, kSize> kModels = {{
-      {0.0, 0.0, 0.0},   {0.0, 1e-14, 0.0}, {0.0, 1e-13, 0.0}, {0.0, 1e-12, 0.0}, {0.0, 1e-11, 0.0},
-      {0.0, 1e-10, 0.0}, {0.0, 1e-9, 0.0},  {0.0, 1e-8, 0.0},  {0.0, 1e-7, 0.0},  {0.0, 1e-6, 0.0},
-      {0.0, 1e-5, 0.0},  {0.0, 1e-4, 0.0},  {0.0, 1e-3, 0.0},  {0.0, 1e-2, 0.0},  {0.0, 1e-1, 0.0},
-      {0.0, 1e0, 0.0},   {0.0, 1e1, 0.0},   {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},   {0.0, 1e4, 0.0},
-      {1e2, 0.0, 0.0},   {1e5, 0.0, 0.0},   {0.0, 0.0, 1e5},
+      {0.0, 0.0, 0.0},   {0.0, 1e-14, 0.0},  {0.0, 1e-13, 0.0}, {0.0, 1e-12, 0.0},
+      {0.0, 1e-11, 0.0}, {0.0, 1e-10, 0.0},  {1e-5, 0.0, 0.0},  {0.0, 1e-9, 0.0},
+      {0.0, 1e-8, 0.0},  {1e-4, 1e-10, 0.0}, {0.0, 1e-7, 0.0},  {0.0, 1e-6, 0.0},
+      {1e-3, 1e-9, 0.0}, {0.0, 1e-5, 0.0},   {0.0, 1e-4, 0.0},  {1e-2, 1e-8, 0.0},
+      {1e-2, 1e-6, 0.0}, {0.0, 1e-3, 0.0},   {0.0, 1e-2, 0.0},  {1e-1, 1e-7, 0.0},
+      {1e-1, 1e-4, 0.0}, {0.0, 1e-1, 0.0},   {0.0, 1e0, 0.0},   {1e0, 1e-6, 0.0},
+      {1e0, 1e-3, 0.0},  {0.0, 1e1, 0.0},    {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},
+      {0.0, 1e4, 0.0},   {1e2, 0.0, 0.0},    {1e5, 0.0, 0.0},   {0.0, 0.0, 1e5},
   }};
 };
 

@@ -38,7 +38,7 @@ class SortedWindow {
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool full() const noexcept { return size_ == Capacity; }
   /// Upper median. Valid: size() > 0.
-  [[nodiscard]] double median() const noexcept { return sorted_[size_ / 2]; }
+  [[nodiscard]] double median() const noexcept { return static_cast<double>(sorted_[size_ / 2]); }
 
   /// Median distance from the median: the two runs left and right of the median are merged from the
   /// inside outwards. Valid: size() > 0.
@@ -52,7 +52,7 @@ class SortedWindow {
           right >= size_ || (left > 0 && centre - sorted_[left - 1] < sorted_[right] - centre);
       distance = take_left ? centre - sorted_[--left] : sorted_[right++] - centre;
     }
-    return distance;
+    return static_cast<double>(distance);
   }
 
  private:
