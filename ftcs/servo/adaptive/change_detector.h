@@ -37,13 +37,16 @@ class ChangeDetector {
     std::size_t winner = kNone;
     float largest = 0.0F;
     for (std::size_t j = i + 1; j < kSize; ++j) {
-      const float threshold = j < kCalm ? calm_threshold : kJumpThreshold;
-      if (sums_[i][j] > threshold && sums_[i][j] > largest) {
-        largest = sums_[i][j];
+      const float lead = j < kCalm - 1 ? sums_[i][j] : sums_[i][j] - kHandicap;
+      if (lead > largest) {
+        largest = lead;
         winner = j;
       }
     }
-    if (winner != kNone) sums_[i].fill(0.0F);
+    if (winner == kNone) return kNone;
+    // If a jump leads that is not yet certain, a calmer model must not act in its place: wait.
+    if (sums_[i][winner] <= (winner < kCalm ? calm_threshold : kJumpThreshold)) return kNone;
+    sums_[i].fill(0.0F);
     return winner;
   }
 
@@ -54,6 +57,8 @@ class ChangeDetector {
   static constexpr double kThreshold = 11.0;
   /// Jumps explain everything for a while; they must be far ahead.
   static constexpr float kJumpThreshold = 30.0F;
+  /// Jumps and the wildest frequency model explain anything: Occam's factor against them, nats.
+  static constexpr float kHandicap = 4.0F;
 
   std::array<std::array<float, kSize>, kCalm> sums_{};
 };

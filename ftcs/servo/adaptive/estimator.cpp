@@ -29,6 +29,9 @@ constexpr std::uint32_t kYoung = 100;
 constexpr std::uint8_t kRejectedInARow = 10;
 constexpr double kRejected = 0.1;
 constexpr double kSmallestScale = 1e-4;
+/// The second opinion costs more than everything else: always early, later every so often.
+constexpr std::uint32_t kOpinionOften = 32;
+constexpr std::uint32_t kOpinionPeriod = 8;
 
 std::size_t index_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 0 : 1;
@@ -85,6 +88,7 @@ void Estimator<Grid, Window>::rescale_time(double factor) noexcept {
   mixed_.xy *= factor;
   mixed_.yd *= factor;
   mixed_.yy *= factor * factor;
+  second_opinion_.rescale_time(factor);
 }
 
 template <class Grid, std::size_t Window>
@@ -127,9 +131,41 @@ double Estimator<Grid, Window>::update(Direction direction, const Observation& s
       if (all_mature && taken % 16 == 0) adopt_shapes();
     }
   }
+  seek_second_opinion(seen, innovation);
   choose();
   mix();
   return credit;
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::seek_second_opinion(const Observation& seen,
+                                                  double innovation) noexcept {
+  second_opinion_.push(seen, innovation);
+  if (count_ > kOpinionOften && count_ % kOpinionPeriod != 0) return;
+  const bool delay_free = two_way() && !known_delay_.known();
+  const FreshFit fit = second_opinion_.consult(delay_free, known_delay_.mean_ns);
+  if (fit.better) start_again(fit);
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::start_again(const FreshFit& fit) noexcept {
+  Estimate start = fit.estimate;
+  scale_ = robust_scale_ = fit.scale_ns;
+  if (known_delay_.known()) {
+    const double sigma = known_delay_.sigma_ns / scale_;
+    start.dd = sigma * sigma;
+    start.xx += start.dd;
+  }
+  bank_.start(start);
+  detector_.clear();
+  for (auto& learner : learner_) learner.restart();
+  shape_ = {};
+  late_outliers_ = {kOutlierStart, kOutlierStart};
+  rejected_ = {};
+  residuals_.clear();
+  forget_evidence();
+  since_change_ = 0;
+  count_ = kJudgeFrom;
 }
 
 template <class Grid, std::size_t Window>

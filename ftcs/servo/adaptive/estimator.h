@@ -9,6 +9,7 @@
 #include "ftcs/servo/adaptive/delay_shape.h"
 #include "ftcs/servo/adaptive/model_bank.h"
 #include "ftcs/servo/adaptive/noise_learner.h"
+#include "ftcs/servo/adaptive/second_opinion.h"
 #include "ftcs/servo/adaptive/sorted_window.h"
 #include "ftcs/time/timestamp_pair.h"
 
@@ -59,6 +60,8 @@ class Estimator {
   void learn_noise(std::size_t side, double innovation) noexcept;
   void adopt_shapes() noexcept;
   void forget_evidence() noexcept;
+  void seek_second_opinion(const Observation& seen, double innovation) noexcept;
+  void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
 
   KnownDelay known_delay_{};
@@ -71,6 +74,7 @@ class Estimator {
   std::array<bool, 2> seen_{};
   std::array<std::uint8_t, 2> rejected_{};
   SortedWindow<Window> residuals_{};
+  SecondOpinion<Window / 2> second_opinion_{};
 
   typename Bank::Row squares_{};  ///< V: credited normalised squares, ns^2
   typename Bank::Row logs_{};     ///< L: credited ln of normalised variance

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/servo/adaptive/second_opinion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ftcs::adaptive {
+namespace {
+
+/// Concentration steps per start: convergence is that fast on a line.
+constexpr int kSteps = 3;
+/// Residuals this many times below the innovations are not chance: with f degrees of freedom the
+/// probability of such luck is about (f / 2 k^2)^(f/2) / Gamma(f/2 + 1), below 1e-6 with sixteen
+/// messages. Fewer messages need more.
+constexpr double kContradiction = 10.0;
+constexpr double kFullFreedom = 9.0;
+/// Below this number of spare messages a fit proves nothing.
+constexpr std::size_t kLeastFreedom = 3;
+/// A fit may be exact (simulated or coarse stamps); the noise is not.
+constexpr double kSmallestScale = 1e-4;
+
+}  // namespace
+
+template <std::size_t Capacity>
+void SecondOpinion<Capacity>::push(const Observation& seen, double innovation) noexcept {
+  time_ += seen.elapsed;
+  messages_[next_] = {time_, seen.z, seen.sign, innovation};
+  next_ = next_ + 1 == Capacity ? 0 : next_ + 1;
+  size_ = std::min(size_ + 1, Capacity);
+}
+
+template <std::size_t Capacity>
+void SecondOpinion<Capacity>::rescale_time(double factor) noexcept {
+  time_ /= factor;
+  for (Message& message : messages_) message.time /= factor;
+}
+
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::residual(const Message& message,
+                                         const Estimate& line) const noexcept {
+  return message.z - line.x - line.y * (message.time - time_) - message.sign * line.d;
+}
+
+/// Least squares of z on (1, t, sign), time relative to the newest message; covariance in units of
+/// the squared residual scale.
+template <std::size_t Capacity>
+Estimate SecondOpinion<Capacity>::fit(const Kept& kept, bool delay_free,
+                                      double known_delay) const noexcept {
+  double n = 0.0, st = 0.0, ss = 0.0, stt = 0.0, sts = 0.0, sz = 0.0, stz = 0.0, ssz = 0.0;
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    const Message& m = messages_[kept.members[k]];
+    const double t = m.time - time_;
+    const double z = delay_free ? m.z : m.z - m.sign * known_delay;
+    n += 1.0;
+    st += t;
+    ss += m.sign;
+    stt += t * t;
+    sts += t * m.sign;
+    sz += z;
+    stz += t * z;
+    ssz += m.sign * z;
+  }
+  // Inverse of [n st ss; st stt sts; ss sts n] by cofactors.
+  Estimate e;
+  if (!delay_free) {
+    const double det = n * stt - st * st;
+    if (!(det > 0.0)) return e;
+    e.xx = stt / det;
+    e.xy = -st / det;
+    e.yy = n / det;
+    e.d = known_delay;
+    e.x = e.xx * sz + e.xy * stz;
+    e.y = e.xy * sz + e.yy * stz;
+    return e;
+  }
+  const double c00 = stt * n - sts * sts;
+  const double c01 = sts * ss - st * n;
+  const double c02 = st * sts - stt * ss;
+  const double det = n * c00 + st * c01 + ss * c02;
+  if (!(det > 0.0)) return e;
+  e.xx = c00 / det;
+  e.xy = c01 / det;
+  e.xd = c02 / det;
+  e.yy = (n * n - ss * ss) / det;
+  e.yd = (st * ss - n * sts) / det;
+  e.dd = (n * stt - st * st) / det;
+  e.x = e.xx * sz + e.xy * stz + e.xd * ssz;
+  e.y = e.xy * sz + e.yy * stz + e.yd * ssz;
+  e.d = e.xd * sz + e.yd * stz + e.dd * ssz;
+  return e;
+}
+
+/// The line through two messages of one direction; the delay from the median of what is left on the
+/// other side.
+template <std::size_t Capacity>
+Estimate SecondOpinion<Capacity>::through(std::size_t a, std::size_t b, bool delay_free,
+                                          double known_delay) const noexcept {
+  const Message& first = messages_[a];
+  const Message& second = messages_[b];
+  Estimate line;
+  line.y = (second.z - first.z) / (second.time - first.time);
+  const double level = first.z - line.y * (first.time - time_);  // x + sign d
+  line.d = known_delay;
+  if (delay_free) {
+    std::array<double, Capacity> others{};
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < size_; ++k) {
+      const Message& m = messages_[k];
+      if (m.sign != first.sign) others[count++] = m.z - line.y * (m.time - time_);  // x - sign d
+    }
+    const auto middle = others.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(others.begin(), middle, others.begin() + static_cast<std::ptrdiff_t>(count));
+    line.d = first.sign * (level - *middle) / 2.0;
+  }
+  line.x = level - first.sign * line.d;
+  return line;
+}
+
+/// Three quarters of the messages of each direction, those closest to the line: each direction by
+/// itself, because a loaded one would otherwise lend its messages to the trimming of the other.
+template <std::size_t Capacity>
+typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
+    const Estimate& line) const noexcept {
+  std::array<double, Capacity> squares{};
+  for (std::size_t k = 0; k < size_; ++k) {
+    const double r = residual(messages_[k], line);
+    squares[k] = r * r;
+  }
+  Kept kept;
+  for (const double sign : {1.0, -1.0}) {
+    const std::size_t begin = kept.count;
+    std::size_t end = begin;
+    for (std::size_t k = 0; k < size_; ++k) {
+      if (messages_[k].sign == sign) kept.members[end++] = static_cast<std::uint8_t>(k);
+    }
+    const std::size_t count = (end - begin) - (end - begin) / 4;
+    if (count == 0) continue;
+    const auto first = kept.members.begin() + static_cast<std::ptrdiff_t>(begin);
+    std::nth_element(
+        first, first + static_cast<std::ptrdiff_t>(count - 1),
+        kept.members.begin() + static_cast<std::ptrdiff_t>(end),
+        [&squares](std::uint8_t x, std::uint8_t y) { return squares[x] < squares[y]; });
+    kept.count += count;
+    for (std::size_t k = begin; k < kept.count; ++k) kept.squares += squares[kept.members[k]];
+  }
+  return kept;
+}
+
+/// Median size of the innovations of one direction over the residual scale that the fit leaves in
+/// it; infinite for a direction that is not there.
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::contradiction(const Kept& kept, const Estimate& line,
+                                              double sign) const noexcept {
+  std::array<double, Capacity> sizes{};
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < size_; ++k) {
+    if (messages_[k].sign == sign) sizes[count++] = std::abs(messages_[k].innovation);
+  }
+  if (count == 0) return std::numeric_limits<double>::infinity();
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count));
+  double squares = 0.0;
+  double members = 0.0;
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    const Message& m = messages_[kept.members[k]];
+    if (m.sign != sign) continue;
+    const double r = residual(m, line);
+    squares += r * r;
+    members += 1.0;
+  }
+  return *middle / std::max(kSmallestScale, std::sqrt(squares / members));
+}
+
+template <std::size_t Capacity>
+FreshFit SecondOpinion<Capacity>::consult(bool delay_free, double known_delay) const noexcept {
+  FreshFit result;
+  const std::size_t unknowns = delay_free ? 3 : 2;
+  double best = -1.0;
+  Kept best_kept;
+  // Elemental starts: every message with the one that is half a window later, if of one direction.
+  for (std::size_t a = 0; a < size_; ++a) {
+    const std::size_t b = (a + size_ / 2) % size_;
+    if (a >= b || messages_[a].sign != messages_[b].sign ||
+        messages_[a].time == messages_[b].time) {
+      continue;
+    }
+    Kept kept = closest(through(a, b, delay_free, known_delay));
+    if (kept.count < unknowns + kLeastFreedom) return result;
+    Estimate line;
+    for (int step = 0; step < kSteps; ++step) {
+      line = fit(kept, delay_free, known_delay);
+      kept = closest(line);
+    }
+    if (line.xx > 0.0 && (best < 0.0 || kept.squares < best)) {
+      best = kept.squares;
+      best_kept = kept;
+      result.estimate = line;
+    }
+  }
+  if (best < 0.0) return result;
+  const double freedom = static_cast<double>(best_kept.count - unknowns);
+  result.scale_ns = std::max(kSmallestScale, std::sqrt(best / freedom));
+  const double needed = kContradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
+  // In both directions, or one that is merely loaded would do.
+  result.better = contradiction(best_kept, result.estimate, 1.0) > needed &&
+                  contradiction(best_kept, result.estimate, -1.0) > needed;
+  return result;
+}
+
+template class SecondOpinion<16>;
+template class SecondOpinion<6>;
+
+}  // namespace ftcs::adaptive

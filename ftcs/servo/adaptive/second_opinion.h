@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/servo/adaptive/model_bank.h"
+
+namespace ftcs::adaptive {
+
+/// What a fresh fit of the last messages says: offset, rate and delay at the newest of them, with
+/// covariances in units of scale^2.
+struct FreshFit {
+  bool better = false;  ///< it contradicts the filters and is far more precise than they are
+  Estimate estimate{};
+  double scale_ns = 0.0;
+};
+
+/// Keeps the last messages and, now and then, fits them anew without any memory:
+///
+///     z = x + y t + sign d,   least trimmed squares over three quarters of them
+///     (Rousseeuw, J. Am. Stat. Assoc. 79, 1984; concentration steps from elemental starts)
+///
+/// Filters that have swallowed a gross error (a spike among the first messages, a jump, hostile
+/// input) take the size of their errors for noise and trust new messages too little. If the fit
+/// leaves residuals far below the filters' own innovations they must start again, from the fit.
+template <std::size_t Capacity>
+class SecondOpinion {
+ public:
+  void push(const Observation& seen, double innovation) noexcept;
+  /// `delay_free`: estimate d too; otherwise the delay is `known_delay`.
+  [[nodiscard]] FreshFit consult(bool delay_free, double known_delay) const noexcept;
+  void clear() noexcept { *this = SecondOpinion{}; }
+  /// The unit of time becomes `factor` times as long.
+  void rescale_time(double factor) noexcept;
+
+ private:
+  struct Message {
+    double time = 0.0;  ///< cycles
+    double z = 0.0;
+    double sign = 1.0;
+    double innovation = 0.0;
+  };
+  struct Kept {
+    std::array<std::uint8_t, Capacity> members{};
+    std::size_t count = 0;
+    double squares = 0.0;
+  };
+
+  [[nodiscard]] Estimate fit(const Kept& kept, bool delay_free, double known_delay) const noexcept;
+  [[nodiscard]] Estimate through(std::size_t a, std::size_t b, bool delay_free,
+                                 double known_delay) const noexcept;
+  [[nodiscard]] Kept closest(const Estimate& line) const noexcept;
+  [[nodiscard]] double contradiction(const Kept& kept, const Estimate& line,
+                                     double sign) const noexcept;
+  [[nodiscard]] double residual(const Message& message, const Estimate& line) const noexcept;
+
+  std::array<Message, Capacity> messages_{};
+  std::size_t size_ = 0;
+  std::size_t next_ = 0;
+  double time_ = 0.0;
+};
+
+extern template class SecondOpinion<16>;
+extern template class SecondOpinion<6>;
+
+}  // namespace ftcs::adaptive
