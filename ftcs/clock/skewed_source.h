@@ -22,6 +22,7 @@ class SkewedSource final : public FreeRunningSource {
   [[nodiscard]] FreeRunningTime from_underlying(FreeRunningTime instant) const noexcept {
     return map_(instant);
   }
+  [[nodiscard]] Rate rate() const noexcept { return map_.rate(); }
   [[nodiscard]] FreeRunningTime to_underlying(FreeRunningTime instant) const noexcept {
     return map_.inverse(instant);
   }
