@@ -9,17 +9,21 @@
 
 #include <fmt/format.h>
 
-namespace ftcs {
+namespace ftcs::app {
 namespace {
 
 constexpr std::size_t kPlotWidth = 40;
 
 std::string_view state_name(const Telemetry& telemetry) {
   switch (telemetry.servo.state) {
-    case ServoState::kUnlocked: return "unlocked";
-    case ServoState::kJump: return "jump";
-    case ServoState::kLocked: return telemetry.locked ? "locked" : "steering";
-    case ServoState::kHoldover: return "holdover";
+    case ServoState::kUnlocked:
+      return "unlocked";
+    case ServoState::kJump:
+      return "jump";
+    case ServoState::kLocked:
+      return telemetry.locked ? "locked" : "steering";
+    case ServoState::kHoldover:
+      return "holdover";
   }
   return "";
 }
@@ -28,7 +32,7 @@ std::string_view state_name(const Telemetry& telemetry) {
 
 std::string offset_plot(std::span<const double> offsets_ns, std::size_t width) {
   constexpr std::array<std::string_view, 8> kHeights{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
-  constexpr double kLowestDecade = 1.0;    // 10 ns
+  constexpr double kLowestDecade = 1.0;             // 10 ns
   constexpr double kDecades = 6.0 - kLowestDecade;  // up to 1 ms
   std::string plot;
   const std::size_t shown = std::min(width, offsets_ns.size());
@@ -54,9 +58,10 @@ void LiveView::draw(std::span<const ServoTrial* const> trials, double elapsed_se
   if (!enabled_) return;
   std::string screen;
   if (drawn_lines_ > 0) screen += fmt::format("\x1b[{}A", drawn_lines_);
-  screen += fmt::format("\x1b[2K{:5.1f} of {:.0f} s   true offset     offset it sees        rate   state     "
-                        "|true offset|, 10 ns to 1 ms\n",
-                        elapsed_seconds, total_seconds);
+  screen += fmt::format(
+      "\x1b[2K{:5.1f} of {:.0f} s   true offset     offset it sees        rate   state     "
+      "|true offset|, 10 ns to 1 ms\n",
+      elapsed_seconds, total_seconds);
   for (const ServoTrial* trial : trials) {
     const Telemetry& latest = trial->latest();
     const auto& truth = trial->true_offsets_ns();
@@ -75,4 +80,4 @@ void LiveView::finish() {
   drawn_lines_ = 0;
 }
 
-}  // namespace ftcs
+}  // namespace ftcs::app

@@ -7,21 +7,23 @@
 
 #include "apps/ftcs/servo_trial.h"
 
-namespace ftcs {
+namespace ftcs::app {
 
-/// |offset| on a logarithmic scale, one character each, the newest on the right: 10 ns is the lowest, 1 ms the
-/// highest of eight heights.
+/// |offset| on a logarithmic scale, one character each, the newest on the right: 10 ns is the
+/// lowest, 1 ms the highest of eight heights.
 [[nodiscard]] std::string offset_plot(std::span<const double> offsets_ns, std::size_t width);
 
 /// A time for people: four significant digits and a unit that fits, "-1.234 us".
 [[nodiscard]] std::string format_time(double ns);
 
-/// A few lines on a terminal that are drawn over again and again; silent where the output is not a terminal.
+/// A few lines on a terminal that are drawn over again and again; silent where the output is not a
+/// terminal.
 class LiveView {
  public:
   explicit LiveView(bool enabled) noexcept : enabled_(enabled) {}
 
-  void draw(std::span<const ServoTrial* const> trials, double elapsed_seconds, double total_seconds);
+  void draw(std::span<const ServoTrial* const> trials, double elapsed_seconds,
+            double total_seconds);
   /// Leaves the last picture standing and the cursor below it.
   void finish();
 
@@ -30,4 +32,4 @@ class LiveView {
   std::size_t drawn_lines_ = 0;
 };
 
-}  // namespace ftcs
+}  // namespace ftcs::app

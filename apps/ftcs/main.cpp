@@ -16,6 +16,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = kSuccess;
   add_analyse_command(app, exit_code);
+  add_demo_command(app, exit_code);
   add_ptp_command(app, exit_code);
   const auto is_command = [&app](const std::string& name) {
     return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })

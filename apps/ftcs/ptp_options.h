@@ -50,6 +50,9 @@ struct PtpOptions {
   Nanoseconds first_step_threshold{20'000};
   Nanoseconds step_threshold{0};
 
+  /// What CLOCK_REALTIME shows at some instant of the oscillator: read at the start unless it is
+  /// given here, so that two processes can stand on one and the same line.
+  std::optional<platform::TimestampClock::RealtimeReading> start{};
   Duration initial_offset{};  ///< of the virtual clock against CLOCK_REALTIME
   double skew_ppb = 0.0;      ///< of the virtual clock's oscillator
 

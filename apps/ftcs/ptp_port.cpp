@@ -36,7 +36,7 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
     : options_(options),
       log_(log),
       timestamps_(std::move(timestamps)),
-      start_(timestamps_->read_realtime()),
+      start_(options.start ? *options.start : timestamps_->read_realtime()),
       oscillator_(timestamps_->source(), Rate::from_ppb(options.skew_ppb), start_.free_running),
       clock_(oscillator_, clock_config(options, start_)),
       transport_(kernel, options.socket, *timestamps_, *this) {}

@@ -52,6 +52,7 @@ class PtpPort : private platform::TransportHandler {
   /// Ends run() with an error line.
   void fail(const std::string& reason);
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
+  [[nodiscard]] SkewedSource& oscillator() { return oscillator_; }
   [[nodiscard]] VirtualClock& clock() { return clock_; }
   [[nodiscard]] const PtpOptions& options() const { return options_; }
   [[nodiscard]] Log& log() { return log_; }

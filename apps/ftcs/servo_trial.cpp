@@ -6,7 +6,7 @@
 
 #include "ftcs/analysis/statistics.h"
 
-namespace ftcs {
+namespace ftcs::app {
 namespace {
 
 double rms(std::span<const double> values) {
@@ -23,7 +23,10 @@ std::span<const double> tail(const Values& values, std::size_t first) {
 }  // namespace
 
 ServoTrial::ServoTrial(const Setup& setup, SkewedSource& source)
-    : setup_(setup), source_(source), clock_(source, setup.clock), discipline_(setup.discipline, clock_) {}
+    : setup_(setup),
+      source_(source),
+      clock_(source, setup.clock),
+      discipline_(setup.discipline, clock_) {}
 
 double ServoTrial::true_offset_ns(FreeRunningTime underlying) const noexcept {
   const LocalTime local = clock_.local_at(source_.from_underlying(underlying));
@@ -44,10 +47,9 @@ void ServoTrial::record_truth_since_last(FreeRunningTime underlying) {
 void ServoTrial::on_pair(const EventPair& pair) {
   const bool forward = pair.direction == Direction::kForward;
   // Before the servo acts on this message: what follows must not colour what was.
-  if (forward) record_truth_since_last(pair.free_running);
+  if (forward) record_truth_since_last(source_.to_underlying(pair.free_running));
 
-  const Telemetry telemetry = discipline_.on_pair(
-      {pair.direction, pair.reference, source_.from_underlying(pair.free_running)});
+  const Telemetry telemetry = discipline_.on_pair(pair);
   if (telemetry.commanded && !first_action_) first_action_ = true_at_samples_.size() - 1;
   if (!forward) return;
 
@@ -87,4 +89,4 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   return result;
 }
 
-}  // namespace ftcs
+}  // namespace ftcs::app

@@ -11,7 +11,7 @@
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 
-namespace ftcs {
+namespace ftcs::app {
 
 /// Where the reference truly is: known only because both clocks of a trial stand on one oscillator.
 /// reference = underlying oscillator + offset.
@@ -27,24 +27,29 @@ struct TrueReference {
 struct TrialResult {
   std::string servo;
   bool locked = false;
-  /// Control intervals after the servo's first action until |true offset| stays inside the band for kLockDwell
-  /// samples; absent if that never came.
+  /// Control intervals after the servo's first action until |true offset| stays inside the band for
+  /// kLockDwell samples; absent if that never came.
   std::optional<std::uint64_t> cycles_to_lock;
   std::uint64_t excursions = 0;  ///< times the true offset left the band after that
-  double rms_perceived_offset_ns = 0.0;  ///< at the sample instants, from lock to the end; noise included
-  double rms_time_error_ns = 0.0;        ///< true, kPointsPerInterval times an interval, from lock to the end
-  double rate_error_ppb = 0.0;           ///< RMS of the true rate error of the tracking rate, from lock to the end
+  double rms_perceived_offset_ns =
+      0.0;  ///< at the sample instants, from lock to the end; noise included
+  double rms_time_error_ns =
+      0.0;  ///< true, kPointsPerInterval times an interval, from lock to the end
+  double rate_error_ppb =
+      0.0;  ///< RMS of the true rate error of the tracking rate, from lock to the end
   double final_time_error_ns = 0.0;
   std::uint64_t samples = 0;
   std::uint64_t rejected = 0;
 };
 
-/// One servo on its own virtual clock, fed with the packets that all trials share, and judged by the truth.
+/// One servo on its own virtual clock, fed with the packets that all trials share, and judged by
+/// the truth.
 class ServoTrial {
  public:
   /// Samples in the band that count as locked.
   static constexpr std::uint64_t kLockDwell = 8;
-  /// The true error is taken between the samples too: a servo that only looks right when asked is found out.
+  /// The true error is taken between the samples too: a servo that only looks right when asked is
+  /// found out.
   static constexpr int kPointsPerInterval = 8;
 
   struct Setup {
@@ -59,13 +64,14 @@ class ServoTrial {
   ServoTrial(const ServoTrial&) = delete;
   ServoTrial& operator=(const ServoTrial&) = delete;
 
-  /// `pair` holds a stamp of the underlying oscillator, as the socket gave it.
   void on_pair(const EventPair& pair);
   void on_new_reference() noexcept { discipline_.on_new_reference(); }
 
   [[nodiscard]] const std::string& name() const noexcept { return setup_.name; }
   [[nodiscard]] const Telemetry& latest() const noexcept { return discipline_.latest(); }
-  [[nodiscard]] std::vector<double> const& true_offsets_ns() const noexcept { return true_at_samples_; }
+  [[nodiscard]] std::vector<double> const& true_offsets_ns() const noexcept {
+    return true_at_samples_;
+  }
   [[nodiscard]] TrialResult result(double lock_band_ns) const;
 
  private:
@@ -78,11 +84,12 @@ class ServoTrial {
   ClockDiscipline discipline_;
   std::optional<FreeRunningTime> last_sample_;
   std::optional<std::uint64_t> first_action_;
-  // Index n of each: the n-th forward message. true_between_ has kPointsPerInterval values for each.
+  // Index n of each: the n-th forward message. true_between_ has kPointsPerInterval values for
+  // each.
   std::vector<double> perceived_;
   std::vector<double> true_at_samples_;
   std::vector<double> true_between_;
   std::vector<double> rate_error_ppb_;
 };
 
-}  // namespace ftcs
+}  // namespace ftcs::app

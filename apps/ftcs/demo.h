@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/ftcs/live_view.h"
+#include "apps/ftcs/ptp_port.h"
+#include "apps/ftcs/servo_trial.h"
+#include "ftcs/platform/child_process.h"
+#include "ftcs/ptp/time_receiver.h"
+
+namespace ftcs::app {
+
+struct DemoOptions {
+  double duration_s = 20.0;
+  std::int8_t log_sync_interval = -3;  ///< 125 ms
+  double skew_ppb = 50'000.0;
+  Duration offset{Nanoseconds{1'000'000}};
+  double max_frequency_ppb = 100'000'000.0;  ///< ±100,000 ppm
+  std::uint16_t event_port =
+      0;                  ///< 0: chosen from the process number, and the next one for general
+  bool live_view = true;  ///< on a terminal only
+};
+
+struct DemoResult {
+  std::string timestamps;  ///< who took the stamps
+  double sync_interval_ns = 0.0;
+  double lock_band_ns = 0.0;   ///< common to all servos: 5 x 1.4826 x MAD of the link's t2 - t1
+  double link_delay_ns = 0.0;  ///< median of t2 - t1 on the common oscillator
+  std::uint64_t samples = 0;
+  std::vector<TrialResult> servos;
+};
+
+/// Time receiver of the demonstration: one protocol core, and every servo on its own virtual clock
+/// behind it.
+class DemoReceiver final : public PtpPort {
+ public:
+  DemoReceiver(platform::Kernel& kernel, const PtpOptions& options, const DemoOptions& demo,
+               Log& log, std::unique_ptr<platform::TimestampClock> timestamps,
+               platform::ChildProcess& transmitter);
+
+  /// Meaningful after run().
+  [[nodiscard]] DemoResult result() const;
+
+ private:
+  ptp::ActionList start(FreeRunningTime now) override;
+  ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                           FreeRunningTime now) override;
+  ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) override;
+  ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
+                          FreeRunningTime now) override;
+  ptp::ActionList on_timer(FreeRunningTime now) override;
+  ptp::ActionList on_link_change(bool up, FreeRunningTime now) override;
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const override {
+    return core_.deadline();
+  }
+  void act(const ptp::Action& action) override;
+  void housekeeping(FreeRunningTime now) override;
+  [[nodiscard]] int finish() override;
+
+  void on_pair(const EventPair& pair);
+  void draw();
+
+  DemoOptions demo_;
+  platform::ChildProcess& transmitter_;
+  ptp::TimeReceiver core_;
+  TrueReference truth_;
+  std::vector<std::unique_ptr<ServoTrial>> trials_;
+  std::vector<double> one_way_ns_;  // t2 - t1 of every Sync, both on the common oscillator
+  LiveView view_;
+};
+
+/// Runs both processes; prints table and sentences. Returns an exit code: locked (FTCS) or not.
+[[nodiscard]] int run_demo(const DemoOptions& options, const std::string& json_file);
+
+/// Table and what it means, for people.
+[[nodiscard]] std::string demo_text(const DemoOptions& options, const DemoResult& result);
+/// Field names: docs/demo.md.
+[[nodiscard]] std::string demo_json(const DemoOptions& options, const DemoResult& result);
+
+}  // namespace ftcs::app

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include <unistd.h>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/demo.h"
+#include "apps/ftcs/ptp_transmitter.h"
+#include "apps/ftcs/units.h"
+#include "ftcs/report/write_file.h"
+
+namespace ftcs::app {
+namespace {
+
+/// Ports of this process alone, below the range of ephemeral ports; no rights needed.
+std::uint16_t default_event_port() {
+  constexpr int kFirst = 20000;
+  constexpr int kPairs = 5000;
+  return static_cast<std::uint16_t>(kFirst + 2 * (getpid() % kPairs));
+}
+
+ptp::ClockIdentity identity(std::uint8_t last) {
+  // Locally administered, as no adapter stands behind it.
+  return ptp::ClockIdentity::from_mac({0x02, 0x46, 0x54, 0x43, 0x53, last});
+}
+
+PtpOptions port_options(const DemoOptions& demo) {
+  PtpOptions options;
+  options.interface = "lo";
+  options.socket.interface = "lo";
+  options.socket.event_port = demo.event_port != 0 ? demo.event_port : default_event_port();
+  options.socket.general_port = static_cast<std::uint16_t>(options.socket.event_port + 1);
+  options.log_sync_interval = demo.log_sync_interval;
+  options.log_min_delay_req_interval = demo.log_sync_interval;
+  options.log_announce_interval = -2;  // two of them qualify the transmitter: half a second
+  options.log_level = static_cast<int>(LogLevel::kWarning);
+  return options;
+}
+
+std::optional<platform::OsError> open(platform::Kernel& kernel, const PtpOptions& options,
+                                      std::unique_ptr<platform::TimestampClock>& clock) {
+  auto opened = platform::TimestampClock::open(kernel, options.interface, options.timestamps);
+  if (!opened) return opened.error();
+  clock = std::move(*opened);
+  return std::nullopt;
+}
+
+int run_transmitter(PtpOptions options) {
+  platform::LinuxKernel kernel;
+  Log log(kernel, stderr, options.log_level);
+  options.role = Role::kTimeTransmitter;
+  std::unique_ptr<platform::TimestampClock> clock;
+  if (const auto error = open(kernel, options, clock)) {
+    fmt::print(stderr, "ftcs demo: {}\n", error->message());
+    return kRuntimeError;
+  }
+  return PtpTransmitter(kernel, options, log, std::move(clock), {identity(1), 1}).run();
+}
+
+struct DemoArguments {
+  DemoOptions options;
+  std::string offset;
+  std::string skew;
+  std::string json_file;
+};
+
+std::optional<std::string> complete(DemoArguments& arguments) {
+  if (!arguments.offset.empty()) {
+    const auto offset = parse_duration(arguments.offset);
+    if (!offset) return "--offset: " + offset.error().message;
+    if (abs(*offset) > Duration{std::chrono::milliseconds{100}}) {
+      return "--offset: at most 100ms either way; within one interval more could not be slewed";
+    }
+    arguments.options.offset = *offset;
+  }
+  if (!arguments.skew.empty()) {
+    const auto skew = parse_ppb(arguments.skew);
+    if (!skew) return "--skew: " + skew.error().message;
+    if (std::abs(*skew) > arguments.options.max_frequency_ppb / 2) {
+      return "--skew: at most 50000ppm either way, half of the rate limit";
+    }
+    arguments.options.skew_ppb = *skew;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+int run_demo(const DemoOptions& demo, const std::string& json_file) {
+  platform::LinuxKernel kernel;
+  PtpOptions options = port_options(demo);
+  Log log(kernel, stderr, options.log_level);
+  std::unique_ptr<platform::TimestampClock> clock;
+  if (const auto error = open(kernel, options, clock)) {
+    fmt::print(stderr, "ftcs demo: {}\n", error->message());
+    return kRuntimeError;
+  }
+  options.start = clock->read_realtime();  // both processes stand on this line: the truth is known
+  auto transmitter = platform::ChildProcess::start([&options] { return run_transmitter(options); });
+  if (!transmitter) {
+    fmt::print(stderr, "ftcs demo: {}\n", transmitter.error().message());
+    return kRuntimeError;
+  }
+  options.clock_identity = identity(2);
+  options.skew_ppb = demo.skew_ppb;
+  options.duration = Duration::from_ns(demo.duration_s * 1e9);
+  const std::string timestamps = clock->is_hardware() ? "hardware" : "kernel software";
+  DemoReceiver receiver(kernel, options, demo, log, std::move(clock), *transmitter);
+  if (const int code = receiver.run(); code != kSuccess) return code;
+
+  DemoResult result = receiver.result();
+  result.timestamps = timestamps;
+  fmt::print("{}", demo_text(demo, result));
+  if (!json_file.empty()) {
+    if (const auto error = write_file(json_file, demo_json(demo, result))) {
+      fmt::print(stderr, "ftcs demo: {}\n", error->message);
+      return kRuntimeError;
+    }
+  }
+  return result.servos.front().locked ? kSuccess : kNotLocked;
+}
+
+void add_demo_command(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand(
+      "demo",
+      "lock a clock to another over PTP on this machine: no root, no configuration, truth known");
+  const auto arguments = std::make_shared<DemoArguments>();
+  DemoOptions& options = arguments->options;
+  command->add_option("--duration", options.duration_s, "seconds; default 20")
+      ->check(CLI::Range(3.0, 86400.0));
+  command->add_option("--json", arguments->json_file, "write the figures to this file")
+      ->type_name("FILE");
+  command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms");
+  command->add_option("--skew", arguments->skew, "of its oscillator; default 50ppm");
+  command
+      ->add_option("--logSyncInterval", options.log_sync_interval,
+                   "log2 of seconds; default -3 (125 ms)")
+      ->check(CLI::Range(-7, 0));
+  command
+      ->add_option("--event-port", options.event_port,
+                   "UDP port, and the next one for general messages")
+      ->check(CLI::Range(1024, 65534));
+  command->add_flag("!--no-live", options.live_view, "no live view on the terminal");
+  command->callback([arguments, &exit_code] {
+    if (const auto wrong = complete(*arguments)) {
+      fmt::print(stderr, "ftcs demo: {}\n", *wrong);
+      exit_code = kUsageError;
+      return;
+    }
+    arguments->options.live_view = arguments->options.live_view && isatty(STDOUT_FILENO) == 1;
+    exit_code = run_demo(arguments->options, arguments->json_file);
+  });
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#include <utility>
+#include <variant>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/demo.h"
+#include "ftcs/analysis/statistics.h"
+#include "ftcs/ptp/interval.h"
+
+namespace ftcs::app {
+namespace {
+
+/// Sync messages of a real system do not arrive on the dot. With T_c = T_sync one that is early by
+/// a part of the interval finds that part of the offset still there; eq. (17) with T_c a little
+/// shorter has it gone in time.
+constexpr double kCorrectionPart = 0.8;
+
+/// The command line admits -7 to 0 only, all of which are intervals.
+Duration sync_interval(const DemoOptions& demo) {
+  return ptp::interval_from_log(demo.log_sync_interval).value_or(Duration{});
+}
+
+std::vector<ServoConfig> demo_servos(const DemoOptions& demo, Nanoseconds interval) {
+  std::vector<ServoConfig> servos;
+  for (const ServoKind kind : {ServoKind::kFtcs, ServoKind::kPics, ServoKind::kLinuxptpPi}) {
+    ServoConfig config;
+    config.kind = kind;
+    config.sync_interval = interval;
+    config.limits = RateLimits::symmetric_ppb(demo.max_frequency_ppb);
+    config.ftcs.correction_time = Nanoseconds{
+        static_cast<std::int64_t>(static_cast<double>(interval.count()) * kCorrectionPart)};
+    config.linuxptp_pi.first_step_threshold = Nanoseconds{0};  // nobody steps here
+    servos.push_back(config);
+  }
+  return servos;
+}
+
+ptp::TimeReceiverConfig receiver_config(const PtpOptions& options) {
+  ptp::TimeReceiverConfig config;
+  config.port = {*options.clock_identity, 1};
+  config.domain = options.domain;
+  config.log_announce_interval = options.log_announce_interval;
+  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
+  return config;
+}
+
+}  // namespace
+
+DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
+                           const DemoOptions& demo, Log& log,
+                           std::unique_ptr<platform::TimestampClock> timestamps,
+                           platform::ChildProcess& transmitter)
+    : PtpPort(kernel, options, log, std::move(timestamps)),
+      demo_(demo),
+      transmitter_(transmitter),
+      core_(receiver_config(options)),
+      truth_{Duration::from_whole_ns(options.start->realtime_ns) -
+             options.start->free_running.since_epoch()},
+      view_(demo.live_view) {
+  const auto interval = Nanoseconds{sync_interval(demo).floor_ns()};
+  VirtualClockConfig start;
+  start.free_running = options.start->free_running;
+  start.local = LocalTime::from_ns(options.start->realtime_ns) + demo.offset;
+  start.limits = RateLimits::symmetric_ppb(demo.max_frequency_ppb);
+  for (const ServoConfig& servo : demo_servos(demo, interval)) {
+    DisciplineConfig discipline;
+    discipline.servo = servo;
+    trials_.push_back(std::make_unique<ServoTrial>(
+        ServoTrial::Setup{std::string(servo_kind_name(servo.kind)), discipline, start, truth_},
+        oscillator()));
+  }
+}
+
+ptp::ActionList DemoReceiver::start(FreeRunningTime now) { return core_.start(now); }
+
+ptp::ActionList DemoReceiver::on_event(std::span<const std::uint8_t> bytes,
+                                       FreeRunningTime received, FreeRunningTime now) {
+  return core_.on_event_message(bytes, received, now);
+}
+
+ptp::ActionList DemoReceiver::on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) {
+  return core_.on_general_message(bytes, now);
+}
+
+ptp::ActionList DemoReceiver::on_sent(std::uint16_t sequence_id,
+                                      std::optional<FreeRunningTime> sent, FreeRunningTime now) {
+  return sent ? core_.on_transmit_timestamp(sequence_id, *sent, now)
+              : core_.on_transmit_timestamp_missing(sequence_id, now);
+}
+
+ptp::ActionList DemoReceiver::on_timer(FreeRunningTime now) { return core_.on_timer(now); }
+
+ptp::ActionList DemoReceiver::on_link_change(bool up, FreeRunningTime now) {
+  return up ? core_.on_link_up(now) : core_.on_link_down(now);
+}
+
+void DemoReceiver::act(const ptp::Action& action) {
+  if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) on_pair(emitted->pair);
+}
+
+void DemoReceiver::on_pair(const EventPair& pair) {
+  for (const auto& trial : trials_) trial->on_pair(pair);
+  if (pair.direction != Direction::kForward) return;
+  const ReferenceTime arrival = truth_.at(oscillator().to_underlying(pair.free_running));
+  one_way_ns_.push_back((arrival - pair.reference).ns());
+  draw();
+}
+
+void DemoReceiver::draw() {
+  std::vector<const ServoTrial*> shown;
+  for (const auto& trial : trials_) shown.push_back(trial.get());
+  view_.draw(shown, seconds_since_start(), demo_.duration_s);
+}
+
+void DemoReceiver::housekeeping(FreeRunningTime) {
+  if (transmitter_.ended()) fail("the time transmitter ended before the demonstration was over");
+}
+
+int DemoReceiver::finish() {
+  view_.finish();
+  if (one_way_ns_.empty()) {
+    log()(LogLevel::kError, "no Sync message arrived on {} within {} s", options().interface,
+          demo_.duration_s);
+    return kRuntimeError;
+  }
+  return kSuccess;
+}
+
+DemoResult DemoReceiver::result() const {
+  constexpr double kSigmaPerMad = 1.4826;  // of a normal distribution
+  constexpr double kBandInSigma = 5.0;
+  const Summary one_way = summarize(one_way_ns_);
+  DemoResult result;
+  result.sync_interval_ns = sync_interval(demo_).ns();
+  result.link_delay_ns = one_way.median;
+  result.lock_band_ns = kBandInSigma * kSigmaPerMad * one_way.median_absolute_deviation;
+  result.samples = one_way_ns_.size();
+  for (const auto& trial : trials_) result.servos.push_back(trial->result(result.lock_band_ns));
+  return result;
+}
+
+}  // namespace ftcs::app

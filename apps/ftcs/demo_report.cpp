@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "apps/ftcs/demo.h"
+#include "ftcs/report/json.h"
+#include "ftcs/report/table.h"
+
+namespace ftcs::app {
+
+std::string demo_text(const DemoOptions& options, const DemoResult& result) {
+  Table table({"servo", "locked", "cycles to lock", "true error, RMS", "offset it sees, RMS",
+               "rate error, RMS", "excursions", "rejected"});
+  for (const TrialResult& servo : result.servos) {
+    table.add_row({servo.servo, servo.locked ? "yes" : "no",
+                   servo.cycles_to_lock ? Cell::count(*servo.cycles_to_lock) : Cell{"-"},
+                   format_time(servo.rms_time_error_ns), format_time(servo.rms_perceived_offset_ns),
+                   fmt::format("{:.3f} ppm", servo.rate_error_ppb * 1e-3),
+                   Cell::count(servo.excursions), Cell::count(servo.rejected)});
+  }
+  std::string text = fmt::format(
+      "\nTwo processes, real PTP messages over loopback, {} timestamps, {} Sync messages, one "
+      "every {}.\n"
+      "Start: {} of offset, {:g} ppm of skew; rate limit ±{:g} ppm; nobody may step.\n"
+      "Locked: true offset inside ±{} (5 x 1.4826 x MAD of t2 - t1) for {} Syncs, counted from the "
+      "servo's first "
+      "action.\nRMS figures from lock to the end of the run (not locked: its second half).\n\n",
+      result.timestamps, result.samples, format_time(result.sync_interval_ns),
+      format_time(options.offset.ns()), options.skew_ppb * 1e-3, options.max_frequency_ppb * 1e-3,
+      format_time(result.lock_band_ns), ServoTrial::kLockDwell);
+  return text + table.to_text();
+}
+
+std::string demo_json(const DemoOptions& options, const DemoResult& result) {
+  Json root;
+  root["duration_s"] = options.duration_s;
+  root["sync_interval_ns"] = result.sync_interval_ns;
+  root["initial_offset_ns"] = options.offset.ns();
+  root["skew_ppb"] = options.skew_ppb;
+  root["max_frequency_ppb"] = options.max_frequency_ppb;
+  root["timestamps"] = result.timestamps;
+  root["link_delay_ns"] = result.link_delay_ns;
+  root["lock_band_ns"] = result.lock_band_ns;
+  root["ptp"] = Json::array();
+  for (const TrialResult& servo : result.servos) {
+    Json row;
+    row["servo"] = servo.servo;
+    row["locked"] = servo.locked;
+    row["cycles_to_lock"] = servo.cycles_to_lock ? Json(*servo.cycles_to_lock) : Json(nullptr);
+    row["lock_band_ns"] = result.lock_band_ns;
+    row["excursions"] = servo.excursions;
+    row["rms_perceived_offset_ns"] = servo.rms_perceived_offset_ns;
+    row["rms_time_error_ns"] = servo.rms_time_error_ns;
+    row["rate_error_ppb"] = servo.rate_error_ppb;
+    row["final_time_error_ns"] = servo.final_time_error_ns;
+    row["samples"] = servo.samples;
+    row["rejected"] = servo.rejected;
+    root["ptp"].push_back(row);
+  }
+  return dump(root);
+}
+
+}  // namespace ftcs::app
