@@ -20,7 +20,7 @@ class LockDetector {
   explicit LockDetector(const LockConfig& config = {}) noexcept : config_(config) {}
 
   bool update(Duration offset) noexcept {
-    return latch_.update(offset, config_.band, config_.dwell);
+    return latch_.update(offset.ns(), config_.band, config_.dwell);
   }
   [[nodiscard]] bool locked() const noexcept { return latch_.closed(); }
   void reset() noexcept { latch_ = ConvergenceLatch{}; }

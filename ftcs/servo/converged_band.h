@@ -27,10 +27,8 @@ struct ConvergedBand {
 class ConvergenceLatch {
  public:
   /// Takes the next offset and returns whether the latch is closed with it.
-  constexpr bool update(Duration offset, const ConvergedBand& band, std::uint32_t dwell) noexcept {
-    // As double, because the magnitude of the most negative Duration has no Duration.
-    const double ns = offset.ns();
-    const double magnitude = ns < 0.0 ? -ns : ns;
+  constexpr bool update(double offset_ns, const ConvergedBand& band, std::uint32_t dwell) noexcept {
+    const double magnitude = offset_ns < 0.0 ? -offset_ns : offset_ns;
     if (closed_) {
       closed_ = magnitude < band.leave.ns();
       if (!closed_) inside_ = 0;

@@ -45,7 +45,7 @@ class FreeRunningServo {
 
  private:
   void remember(const SyncSample& sample) noexcept {
-    previous_ = sample;
+    previous_ = instant_of(sample);
     has_previous_ = true;
     snapshot_.offset = sample.offset();
     snapshot_.path_delay = sample.path_delay;
@@ -53,7 +53,7 @@ class FreeRunningServo {
 
   FreeRunningConfig config_;
   bool has_previous_ = false;
-  SyncSample previous_{};
+  SampleInstant previous_{};
   ServoSnapshot snapshot_{};
 };
 

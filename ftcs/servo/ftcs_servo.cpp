@@ -2,6 +2,18 @@
 #include "ftcs/servo/ftcs_servo.h"
 
 namespace ftcs {
+namespace {
+
+/// The correction ends T_c after the *sample* (Fig. 3: local and reference meet at tau_rd(n) +
+/// T_c), however late the command comes. A command that is later than half of T_c would need more
+/// than twice the rate: it takes its half of T_c all the same.
+Duration remaining_time(Duration correction_time, Duration latency) noexcept {
+  const Duration remaining = correction_time - latency;
+  const Duration shortest = correction_time.half();
+  return remaining < shortest ? shortest : remaining;
+}
+
+}  // namespace
 
 std::optional<ServoConfigError> validate(const FtcsConfig& config) noexcept {
   if (config.sync_interval < Nanoseconds{0}) return ServoConfigError::kSyncInterval;
@@ -22,7 +34,7 @@ std::optional<ServoConfigError> validate(const FtcsConfig& config) noexcept {
 
 void FtcsServo::prime(const SyncSample& sample) noexcept {
   if (state_.phase != Phase::kEmpty) return;
-  state_.previous = sample;
+  state_.previous = instant_of(sample);
   state_.phase = Phase::kPrimed;
   snapshot_.offset = sample.offset();
   snapshot_.path_delay = sample.path_delay;
@@ -47,9 +59,8 @@ ServoUpdate FtcsServo::update(const SyncSample& sample, const ClockReading& now)
   snapshot_.state = ServoState::kLocked;
   snapshot_.offset = sample.offset();
   snapshot_.path_delay = sample.path_delay;
-  const ServoCommand command = steer(sample, now, progress);
-  state_.previous = sample;
-  return {SampleVerdict::kUsed, true, command};
+  state_.previous = instant_of(sample);
+  return steer(sample, now, progress);
 }
 
 void FtcsServo::reset() noexcept {
@@ -57,53 +68,43 @@ void FtcsServo::reset() noexcept {
   snapshot_.state = ServoState::kUnlocked;
 }
 
-namespace {
-
-/// The correction ends T_c after the *sample* (Fig. 3: local and reference meet at tau_rd(n) +
-/// T_c), however late the command comes. A command that is later than half of T_c would need more
-/// than twice the rate: it takes its half of T_c all the same.
-Duration remaining_time(Duration correction_time, Duration latency) noexcept {
-  const Duration remaining = correction_time - latency;
-  const Duration shortest = correction_time.half();
-  return remaining < shortest ? shortest : remaining;
-}
-
-}  // namespace
-
-double FtcsServo::gain_for(Duration offset) noexcept {
+double FtcsServo::gain_for(double offset_ns) noexcept {
   const bool first_action = state_.phase != Phase::kActing;
   if (first_action && config_.converged_dwell > 0) return 1.0;
   const bool converged =
-      state_.converged.update(offset, config_.converged_band, config_.converged_dwell);
+      state_.converged.update(offset_ns, config_.converged_band, config_.converged_dwell);
   return converged ? config_.offset_gain : 1.0;
 }
 
-ServoCommand FtcsServo::steer(const SyncSample& sample, const ClockReading& now,
-                              const SampleProgress& progress) noexcept {
+ServoUpdate FtcsServo::steer(const SyncSample& sample, const ClockReading& now,
+                             const SampleProgress& progress) noexcept {
   const Rate tracking = progress.ratio();
-  const Duration latency = scale(now.free_running - sample.free_running, tracking);
-  const ReferenceTime reference_now = sample.reference() + latency;
-  const Duration offset = offset_from_reference(now.local, reference_now);
-  const double gain = gain_for(offset);
+  // Since the sample the clock went on by local_elapsed and the reference by waited * tracking. The
+  // large parts are subtracted as integers; only the oscillator's deviation is multiplied as a
+  // double.
+  const Duration waited = now.free_running - sample.free_running;
+  const Duration local_elapsed = now.local - sample.local;
+  const double extra_ns = waited.ns() * tracking.deviation();
+  const double offset_ns = (snapshot_.offset + (local_elapsed - waited)).ns() - extra_ns;
+  const double gain = gain_for(offset_ns);
 
   const Duration sync_interval =
       config_.sync_interval > Nanoseconds{0} ? Duration{config_.sync_interval} : progress.reference;
   const Duration wanted_time =
       config_.correction_time > Nanoseconds{0} ? Duration{config_.correction_time} : sync_interval;
-  const Duration correction_time = remaining_time(wanted_time, latency);
+  const Duration correction_time =
+      remaining_time(wanted_time, waited + Duration::from_ns(extra_ns));
   // (1 + p T_offset / T_c) k a with T_offset = -offset   (17), (19)
-  const Rate pull = Rate::from_ratio(1.0 - gain * offset.ns() / correction_time.ns());
-  snapshot_.rate_ratio = tracking;
-  snapshot_.offset_gain = gain;
-  ServoCommand command;
-  const Rate wanted = pull * tracking;
-  command.correction_rate = config_.limits.clamp(wanted);
+  const Rate wanted = Rate::from_ratio(1.0 - gain * offset_ns / correction_time.ns()) * tracking;
+  const Rate correction = config_.limits.clamp(wanted);
   // As long as F cuts eq. 18 short, the offset it was to remove is still there: the first action
   // goes on.
-  if (command.correction_rate == wanted) state_.phase = Phase::kActing;
-  command.correction_time = correction_time;
-  command.tracking_rate = config_.limits.clamp(tracking);
-  return command;
+  if (correction.ratio() == wanted.ratio()) state_.phase = Phase::kActing;
+  snapshot_.rate_ratio = tracking;
+  snapshot_.offset_gain = gain;
+  return {SampleVerdict::kUsed,
+          true,
+          {correction, correction_time, config_.limits.clamp(tracking), Duration{}}};
 }
 
 }  // namespace ftcs

@@ -64,13 +64,13 @@ class FtcsServo {
   enum class Phase : std::uint8_t { kEmpty, kPrimed, kActing };
   struct State {
     Phase phase = Phase::kEmpty;
-    SyncSample previous{};
+    SampleInstant previous{};
     ConvergenceLatch converged{};
   };
 
-  [[nodiscard]] double gain_for(Duration offset) noexcept;
-  [[nodiscard]] ServoCommand steer(const SyncSample& sample, const ClockReading& now,
-                                   const SampleProgress& progress) noexcept;
+  [[nodiscard]] double gain_for(double offset_ns) noexcept;
+  [[nodiscard]] ServoUpdate steer(const SyncSample& sample, const ClockReading& now,
+                                  const SampleProgress& progress) noexcept;
 
   FtcsConfig config_;
   State state_{};

@@ -33,7 +33,7 @@ ServoUpdate PicsServo::update(const SyncSample& sample, const ClockReading&) noe
     previous_error_ = config_.previous_error_starts_at_zero ? Duration{} : error;
   }
   const Duration change = error - previous_error_;
-  previous_ = sample;
+  previous_ = instant_of(sample);
   has_previous_ = true;
   previous_error_ = error;
   snapshot_.offset = sample.offset();

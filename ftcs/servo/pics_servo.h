@@ -60,7 +60,7 @@ class PicsServo {
   PicsConfig config_;
   Rate rate_;
   bool has_previous_ = false;
-  SyncSample previous_{};
+  SampleInstant previous_{};
   Duration previous_error_{};
   ServoSnapshot snapshot_{};
 };

@@ -5,6 +5,16 @@
 
 namespace ftcs {
 
+/// When a forward message was sent and received: all that the next one is compared with.
+struct SampleInstant {
+  ReferenceTime origin;
+  FreeRunningTime free_running;
+};
+
+[[nodiscard]] constexpr SampleInstant instant_of(const SyncSample& sample) noexcept {
+  return {sample.origin, sample.free_running};
+}
+
 /// Elapsed time between two forward messages on both clocks, and whether it can be true.
 struct SampleProgress {
   Duration reference{};     ///< tau_r(n) - tau_r(n-1), without the path delay
@@ -22,7 +32,7 @@ struct SampleProgress {
 /// message). kImplausible: newer on one clock only, or at a ratio of rates outside `plausible` (one
 /// of the clocks jumped). Differences are taken modulo 2^64 ns, so that a counter that wraps is no
 /// event.
-[[nodiscard]] inline SampleProgress progress_between(const SyncSample& previous,
+[[nodiscard]] inline SampleProgress progress_between(const SampleInstant& previous,
                                                      const SyncSample& sample,
                                                      const RateLimits& plausible) noexcept {
   SampleProgress progress{sample.origin - previous.origin,
@@ -35,6 +45,11 @@ struct SampleProgress {
     progress.verdict = SampleVerdict::kImplausible;
   }
   return progress;
+}
+[[nodiscard]] inline SampleProgress progress_between(const SyncSample& previous,
+                                                     const SyncSample& sample,
+                                                     const RateLimits& plausible) noexcept {
+  return progress_between(instant_of(previous), sample, plausible);
 }
 
 }  // namespace ftcs

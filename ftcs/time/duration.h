@@ -68,7 +68,13 @@ class Duration {
     const std::uint32_t fraction = 0U - a.fraction_;
     return from_parts(wrap_add(~a.whole_, fraction == 0 ? 1 : 0), fraction);
   }
-  friend constexpr Duration operator-(Duration a, Duration b) noexcept { return a + (-b); }
+  friend constexpr Duration operator-(Duration a, Duration b) noexcept {
+    // The upper half of the difference of the fractions is 0 or, with a borrow, -1.
+    const std::uint64_t fraction = std::uint64_t{a.fraction_} - b.fraction_;
+    return from_parts(
+        wrap_add(wrap_subtract(a.whole_, b.whole_), static_cast<std::int64_t>(fraction) >> 32),
+        static_cast<std::uint32_t>(fraction));
+  }
   constexpr Duration& operator+=(Duration other) noexcept { return *this = *this + other; }
   constexpr Duration& operator-=(Duration other) noexcept { return *this = *this - other; }
 
@@ -83,6 +89,11 @@ class Duration {
 
   [[nodiscard]] static constexpr std::int64_t wrap_add(std::int64_t a, std::int64_t b) noexcept {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+  }
+
+  [[nodiscard]] static constexpr std::int64_t wrap_subtract(std::int64_t a,
+                                                            std::int64_t b) noexcept {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
   }
 
   std::int64_t whole_ = 0;
