@@ -41,8 +41,8 @@ struct SyncStatistics {
 ///   0x001B                    no outputs for the time of the watchdog
 class DriveApplication {
  public:
-  DriveApplication(EscMemory& memory, DcUnit& dc, const Identity& identity) noexcept
-      : memory_(memory), dc_(dc), objects_(identity) {}
+  DriveApplication(EscMemory& memory, const Identity& identity) noexcept
+      : memory_(memory), objects_(identity) {}
 
   void power_on(Duration now) noexcept;
   /// AL control was written.
@@ -79,7 +79,6 @@ class DriveApplication {
   [[nodiscard]] Sdo answer(const Sdo& request, ObjectDictionary::Upload& upload) noexcept;
 
   EscMemory& memory_;
-  DcUnit& dc_;
   ObjectDictionary objects_;
   DriveMotor motor_;
 

@@ -22,7 +22,7 @@ SubDevice::SubDevice(const SubDeviceConfig& config, LocalOscillator& oscillator)
       oscillator_(oscillator),
       dc_(memory_, oscillator, config.clock),
       sii_(memory_, make_drive_image(config.identity, config.alias, config.dc)),
-      drive_(memory_, dc_, config.identity) {
+      drive_(memory_, config.identity) {
   power_cycle(WireTime{});
 }
 

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/ethercat/maindevice/configurator.h"
+
+namespace ftcs::ethercat {
+
+namespace {
+constexpr std::uint16_t kReceiveAssign = 0x1C12;
+constexpr std::uint16_t kTransmitAssign = 0x1C13;
+constexpr std::size_t kOutputManager = 2;
+constexpr std::size_t kInputManager = 3;
+constexpr std::size_t kAlStatusSize = 6;
+/// Defaults for a SubDevice whose SII does not describe its sync managers.
+constexpr std::uint8_t kMailboxOutControl = 0x26;
+constexpr std::uint8_t kMailboxInControl = 0x22;
+constexpr std::uint8_t kActivate = reg::kActivateCyclic | reg::kActivateSync0;
+
+SyncManagerChannel process_channel(const SubDeviceInfo& device, std::size_t n,
+                                   std::uint16_t size) noexcept {
+  SyncManagerChannel channel =
+      n < device.sii.sync_manager_count ? device.sii.sync_managers[n] : SyncManagerChannel{};
+  channel.length = size;
+  channel.active = size > 0;
+  return channel;
+}
+}  // namespace
+
+void Configurator::start(const ConfiguratorConfig& config) noexcept {
+  config_ = config;
+  step_ = Step::kMailboxes;
+  device_ = 0;
+  sync0_start_ = 0;
+  deadline_set_ = false;
+}
+
+bool Configurator::concerns(const SubDeviceInfo& device) const noexcept {
+  switch (step_) {
+    case Step::kMailboxes:
+      return device.sii.receive.size > 0;
+    case Step::kObjects:
+      return device.sii.coe() && !config_.objects.empty();
+    case Step::kSizes:
+      return device.sii.coe();
+    case Step::kSync0:
+      return config_.sync0 && device.dc();
+    default:
+      return true;
+  }
+}
+
+void Configurator::begin() noexcept {
+  deadline_set_ = false;
+  if (step_ == Step::kObjects) {
+    object_ = 0;
+    sdo_.start_download(config_.objects[0], config_.sdo_timeout);
+  }
+  if (step_ == Step::kSizes) {
+    walk_ = MappingWalk{};
+    sdo_.start_upload(walk_object(), config_.sdo_timeout);
+  }
+}
+
+Progress Configurator::advance(Network& network, Failure& failure) noexcept {
+  while (true) {
+    ++device_;
+    const bool once = step_ == Step::kReferenceTime;
+    if (device_ >= network.count || once) {
+      if (step_ == Step::kAwaitSafeOp) return Progress::kDone;
+      step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
+      device_ = 0;
+      if (step_ == Step::kChannels && place_image(network, failure) == Progress::kFailed) {
+        return Progress::kFailed;
+      }
+      if (step_ == Step::kReferenceTime) {
+        if (config_.sync0 && network.has_reference()) return Progress::kContinue;
+        continue;
+      }
+    }
+    if (!concerns(network.devices[device_])) continue;
+    begin();
+    return Progress::kContinue;
+  }
+}
+
+void Configurator::request(FrameWriter& writer, const Network& network) noexcept {
+  using enum Command;
+  const SubDeviceInfo& device = network.devices[device_];
+  switch (step_) {
+    case Step::kMailboxes: {
+      const Bytes both = writer.add(device.target(kFpwr, reg::kSyncManager), 16);
+      const MailboxWindow& in = device.sii.receive;
+      const MailboxWindow& out = device.sii.send;
+      SyncManagerChannel{in.start, in.size, kMailboxOutControl, in.size > 0}.encode(both);
+      SyncManagerChannel{out.start, out.size, kMailboxInControl, out.size > 0}.encode(
+          both.subspan(8));
+      break;
+    }
+    case Step::kRequestPreOp:
+      writer.add_value(device.target(kFpwr, reg::kAlControl), std::uint16_t{2});
+      break;
+    case Step::kRequestSafeOp:
+      writer.add_value(device.target(kFpwr, reg::kAlControl), std::uint16_t{4});
+      break;
+    case Step::kAwaitPreOp:
+    case Step::kAwaitSafeOp:
+      writer.add(device.target(kFprd, reg::kAlStatus), kAlStatusSize);
+      break;
+    case Step::kObjects:
+    case Step::kSizes:
+      sdo_.request(writer, device);
+      break;
+    case Step::kChannels:
+      write_channels(writer, device);
+      break;
+    case Step::kReferenceTime:
+      writer.add(network.devices[network.reference].target(kFprd, reg::kSystemTime), 8);
+      break;
+    case Step::kSync0:
+      write_sync0(writer, device);
+      break;
+  }
+}
+
+void Configurator::write_channels(FrameWriter& writer, const SubDeviceInfo& device) noexcept {
+  using enum Command;
+  const SyncManagerChannel out = process_channel(device, kOutputManager, device.outputs.size);
+  const SyncManagerChannel in = process_channel(device, kInputManager, device.inputs.size);
+  const Bytes managers = writer.add(device.target(kFpwr, reg::kSyncManager + 16), 16);
+  out.encode(managers);
+  in.encode(managers.subspan(reg::kSyncManagerSize));
+  const Bytes fmmus = writer.add(device.target(kFpwr, reg::kFmmu), 2 * reg::kFmmuSize);
+  FmmuChannel{.logical_start = kLogicalStart + device.outputs.offset,
+              .length = device.outputs.size,
+              .physical_start = out.start,
+              .write = true,
+              .active = out.active}
+      .encode(fmmus);
+  FmmuChannel{.logical_start = kLogicalStart + device.inputs.offset,
+              .length = device.inputs.size,
+              .physical_start = in.start,
+              .read = true,
+              .active = in.active}
+      .encode(fmmus.subspan(reg::kFmmuSize));
+}
+
+void Configurator::write_sync0(FrameWriter& writer, const SubDeviceInfo& device) noexcept {
+  using enum Command;
+  writer.add_value(device.target(kFpwr, reg::kDcActivation), std::uint8_t{0});
+  writer.add_value(device.target(kFpwr, reg::kCyclicUnitControl), std::uint8_t{0});
+  writer.add_value(device.target(kFpwr, reg::kSync0CycleTime),
+                   static_cast<std::uint32_t>(config_.cycle.count()));
+  writer.add_value(device.target(kFpwr, reg::kSync0StartTime), sync0_start_);
+  writer.add_value(device.target(kFpwr, reg::kDcActivation), kActivate);
+}
+
+/// A whole multiple of the cycle, so that the phase is the same after each start, plus the shift.
+void Configurator::plan_sync0(ConstBytes system_time) noexcept {
+  const auto cycle = static_cast<std::uint64_t>(config_.cycle.count());
+  const std::uint64_t earliest =
+      load<std::uint64_t>(system_time, 0) + static_cast<std::uint64_t>(config_.sync0_lead.count());
+  sync0_start_ =
+      (earliest / cycle + 1) * cycle + static_cast<std::uint64_t>(config_.sync0_shift.count());
+}
+
+Progress Configurator::reply(const FrameView& frame, Network& network, LocalTime now,
+                             Failure& failure) noexcept {
+  SubDeviceInfo& device = network.devices[device_];
+  Progress progress = Progress::kDone;
+  switch (step_) {
+    case Step::kAwaitPreOp:
+      progress = await(frame, device, AlState::kPreOp, now, failure);
+      break;
+    case Step::kAwaitSafeOp:
+      progress = await(frame, device, AlState::kSafeOp, now, failure);
+      break;
+    case Step::kObjects:
+      progress = objects(frame, now, failure);
+      break;
+    case Step::kSizes:
+      progress = sizes(frame, device, now, failure);
+      break;
+    default:
+      if (frame[0].working_counter() != 1) {
+        progress = fail(failure, {.kind = FailureKind::kNotAnswering,
+                                  .position = static_cast<std::uint16_t>(device_)});
+      } else if (step_ == Step::kReferenceTime) {
+        plan_sync0(frame[0].data());
+      }
+      break;
+  }
+  return progress == Progress::kDone ? advance(network, failure) : progress;
+}
+
+Progress Configurator::await(const FrameView& frame, SubDeviceInfo& device, AlState wanted,
+                             LocalTime now, Failure& failure) noexcept {
+  if (frame[0].working_counter() == 1) device.set_al_status(frame[0].data());
+  if (device.state == wanted && !device.error) return Progress::kDone;
+  if (!deadline_set_) deadline_ = now + config_.state_timeout;
+  deadline_set_ = true;
+  if (!device.error && now < deadline_) return Progress::kContinue;
+  return fail(failure,
+              {.kind = device.error ? FailureKind::kStateRefused : FailureKind::kStateTimeout,
+               .position = static_cast<std::uint16_t>(device_),
+               .wanted = wanted,
+               .actual = device.state,
+               .code = device.code});
+}
+
+Progress Configurator::objects(const FrameView& frame, LocalTime now, Failure& failure) noexcept {
+  const Progress progress = sdo_.reply(frame, device_, now, failure);
+  if (progress != Progress::kDone) return progress;
+  if (++object_ == config_.objects.size()) return Progress::kDone;
+  sdo_.start_download(config_.objects[object_], config_.sdo_timeout);
+  return Progress::kContinue;
+}
+
+ObjectAddress Configurator::walk_object() const noexcept {
+  const std::uint16_t assign = walk_.inputs ? kTransmitAssign : kReceiveAssign;
+  switch (walk_.part) {
+    case MappingWalk::Part::kAssigned:
+      return {assign, 0};
+    case MappingWalk::Part::kMap:
+      return {assign, walk_.map};
+    case MappingWalk::Part::kEntries:
+      return {walk_.index, 0};
+    case MappingWalk::Part::kEntry:
+      break;
+  }
+  return {walk_.index, walk_.entry};
+}
+
+/// One value of the walk; true when the assignment is at its end.
+bool Configurator::walk(std::uint32_t value) noexcept {
+  using Part = MappingWalk::Part;
+  switch (walk_.part) {
+    case Part::kAssigned:
+      walk_.maps = static_cast<std::uint8_t>(value);
+      walk_.map = 0;
+      break;
+    case Part::kMap:
+      walk_.index = static_cast<std::uint16_t>(value);
+      walk_.part = Part::kEntries;
+      return false;
+    case Part::kEntries:
+      walk_.entries = static_cast<std::uint8_t>(value);
+      walk_.entry = 0;
+      break;
+    case Part::kEntry:
+      walk_.bits += value & 0xFFU;
+      break;
+  }
+  if (walk_.part != Part::kAssigned && walk_.entry < walk_.entries) {
+    ++walk_.entry;
+    walk_.part = Part::kEntry;
+    return false;
+  }
+  if (walk_.map == walk_.maps) return true;
+  ++walk_.map;
+  walk_.part = Part::kMap;
+  return false;
+}
+
+Progress Configurator::sizes(const FrameView& frame, SubDeviceInfo& device, LocalTime now,
+                             Failure& failure) noexcept {
+  const Progress progress = sdo_.reply(frame, device_, now, failure);
+  if (progress != Progress::kDone) return progress;
+  if (walk(sdo_.value())) {
+    const auto bytes = static_cast<std::uint16_t>((walk_.bits + 7) / 8);
+    (walk_.inputs ? device.inputs : device.outputs).size = bytes;
+    if (walk_.inputs) return Progress::kDone;
+    walk_ = MappingWalk{};
+    walk_.inputs = true;
+  }
+  sdo_.start_upload(walk_object(), config_.sdo_timeout);
+  return Progress::kContinue;
+}
+
+Progress Configurator::place_image(Network& network, Failure& failure) noexcept {
+  std::size_t at = 0;
+  for (SubDeviceInfo& device : network.all()) {
+    if (!device.sii.coe() && device.sii.sync_manager_count > kInputManager) {
+      device.outputs.size = device.sii.sync_managers[kOutputManager].length;
+      device.inputs.size = device.sii.sync_managers[kInputManager].length;
+    }
+  }
+  for (const bool inputs : {false, true}) {
+    for (SubDeviceInfo& device : network.all()) {
+      ImagePart& part = inputs ? device.inputs : device.outputs;
+      part.offset = static_cast<std::uint16_t>(at);
+      at += part.size;
+    }
+  }
+  if (at <= kMaxImageSize) return Progress::kContinue;
+  return fail(failure, {.kind = FailureKind::kProcessImageTooLarge,
+                        .expected = kMaxImageSize,
+                        .received = static_cast<std::uint16_t>(at)});
+}
+
+}  // namespace ftcs::ethercat

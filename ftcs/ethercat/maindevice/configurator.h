@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "ftcs/ethercat/maindevice/network.h"
+#include "ftcs/ethercat/maindevice/procedure.h"
+#include "ftcs/ethercat/maindevice/sdo_client.h"
+
+namespace ftcs::ethercat {
+
+struct ConfiguratorConfig {
+  std::span<const SdoDownload> objects;  ///< written to every SubDevice with CoE, in PREOP
+  Nanoseconds cycle{1'000'000};
+  /// SYNC0 comes so long after the whole multiples of the cycle in reference time.
+  Nanoseconds sync0_shift{0};
+  /// The first SYNC0 lies so far ahead that all SubDevices have been told in time.
+  Nanoseconds sync0_lead{100'000'000};
+  bool sync0 = true;
+  Nanoseconds state_timeout{2'000'000'000};
+  Nanoseconds sdo_timeout{1'000'000'000};
+};
+
+/// Logical address of the process image; outputs first, inputs behind them.
+inline constexpr std::uint32_t kLogicalStart = 0x00010000;
+/// What fits into one frame beside the other cyclic datagrams.
+inline constexpr std::size_t kMaxImageSize = 1400;
+
+/// Takes all SubDevices from INIT to SAFEOP, one step for all of them before the next: mailboxes,
+/// PREOP, objects, sizes of the process data (from CoE, else from the SII), sync managers and
+/// FMMUs, SYNC0, SAFEOP.
+class Configurator {
+ public:
+  void start(const ConfiguratorConfig& config) noexcept;
+  void request(FrameWriter& writer, const Network& network) noexcept;
+  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime now,
+                               Failure& failure) noexcept;
+  /// System time of the first SYNC0; zero if there is none.
+  [[nodiscard]] std::uint64_t sync0_start() const noexcept { return sync0_start_; }
+
+ private:
+  enum class Step : std::uint8_t {
+    kMailboxes,
+    kRequestPreOp,
+    kAwaitPreOp,
+    kObjects,
+    kSizes,
+    kChannels,
+    kReferenceTime,
+    kSync0,
+    kRequestSafeOp,
+    kAwaitSafeOp,
+  };
+  /// Where the walk through an assignment object stands (0x1C12, 0x1C13).
+  struct MappingWalk {
+    enum class Part : std::uint8_t { kAssigned, kMap, kEntries, kEntry };
+    Part part = Part::kAssigned;
+    bool inputs = false;
+    std::uint8_t maps = 0;
+    std::uint8_t map = 0;
+    std::uint16_t index = 0;
+    std::uint8_t entries = 0;
+    std::uint8_t entry = 0;
+    std::uint32_t bits = 0;
+  };
+
+  [[nodiscard]] bool concerns(const SubDeviceInfo& device) const noexcept;
+  /// The next SubDevice that this step concerns, or the next step. Done after the last.
+  [[nodiscard]] Progress advance(Network& network, Failure& failure) noexcept;
+  void begin() noexcept;
+  void write_channels(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
+  void write_sync0(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
+  [[nodiscard]] Progress await(const FrameView& frame, SubDeviceInfo& device, AlState wanted,
+                               LocalTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress objects(const FrameView& frame, LocalTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress sizes(const FrameView& frame, SubDeviceInfo& device, LocalTime now,
+                               Failure& failure) noexcept;
+  [[nodiscard]] bool walk(std::uint32_t value) noexcept;
+  [[nodiscard]] ObjectAddress walk_object() const noexcept;
+  [[nodiscard]] Progress place_image(Network& network, Failure& failure) noexcept;
+  void plan_sync0(ConstBytes system_time) noexcept;
+
+  ConfiguratorConfig config_;
+  Step step_ = Step::kMailboxes;
+  std::size_t device_ = 0;
+  std::size_t object_ = 0;
+  SdoClient sdo_;
+  MappingWalk walk_;
+  LocalTime deadline_;
+  bool deadline_set_ = false;
+  std::uint64_t sync0_start_ = 0;
+};
+
+}  // namespace ftcs::ethercat

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/ethercat/maindevice/csp_profile.h"
+
+namespace ftcs::ethercat {
+
+enum class AxisState : std::uint8_t { kDisabled, kEnabling, kEnabled, kFault };
+[[nodiscard]] const char* name(AxisState state) noexcept;
+
+/// One drive in cyclic synchronous position: walks the state machine of CiA 402 and keeps the
+/// target on the actual position until the drive is enabled, so that enabling never jumps.
+class CspAxis {
+ public:
+  struct Command {
+    bool enable = false;
+    bool reset_fault = false;
+    /// Displacement from where the axis stood when it was enabled, counts.
+    std::int32_t displacement = 0;
+  };
+  /// One cycle: what to send, given what came.
+  [[nodiscard]] csp::Outputs cycle(const csp::Inputs& inputs, const Command& command) noexcept;
+
+  [[nodiscard]] AxisState state() const noexcept { return state_; }
+  [[nodiscard]] std::int32_t origin() const noexcept { return origin_; }
+  void restart() noexcept { *this = CspAxis{}; }
+
+ private:
+  AxisState state_ = AxisState::kDisabled;
+  std::int32_t origin_ = 0;
+  bool reset_sent_ = false;
+};
+
+}  // namespace ftcs::ethercat

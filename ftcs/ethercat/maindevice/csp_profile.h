@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ftcs/ethercat/maindevice/sdo_client.h"
+#include "ftcs/ethercat/wire/bytes.h"
+
+namespace ftcs::ethercat {
+
+/// 0x60C2 as mantissa and power of ten in seconds; a mantissa of zero: not representable.
+struct InterpolationPeriod {
+  std::uint8_t mantissa = 0;
+  std::int8_t exponent = -9;
+
+  [[nodiscard]] static constexpr InterpolationPeriod of(Nanoseconds cycle) noexcept {
+    std::int64_t mantissa = cycle.count();
+    int exponent = -9;
+    while (mantissa > 0 && mantissa % 10 == 0) {
+      mantissa /= 10;
+      ++exponent;
+    }
+    if (mantissa <= 0 || mantissa > 0xFF) return {};
+    return {static_cast<std::uint8_t>(mantissa), static_cast<std::int8_t>(exponent)};
+  }
+};
+
+/// Objects that make a CiA 402 drive ready for cyclic synchronous position with SYNC0: mapping
+/// (controlword, target position, mode; statusword, position, mode), sync type and cycle times.
+[[nodiscard]] constexpr std::array<SdoDownload, 21> csp_objects(Nanoseconds cycle) noexcept {
+  const auto cycle_ns = static_cast<std::uint32_t>(cycle.count());
+  const InterpolationPeriod period = InterpolationPeriod::of(cycle);
+  return {{
+      {{0x1C12, 0}, 1, 0},
+      {{0x1600, 0}, 1, 0},
+      {{0x1600, 1}, 4, 0x60400010},
+      {{0x1600, 2}, 4, 0x607A0020},
+      {{0x1600, 3}, 4, 0x60600008},
+      {{0x1600, 0}, 1, 3},
+      {{0x1C12, 1}, 2, 0x1600},
+      {{0x1C12, 0}, 1, 1},
+      {{0x1C13, 0}, 1, 0},
+      {{0x1A00, 0}, 1, 0},
+      {{0x1A00, 1}, 4, 0x60410010},
+      {{0x1A00, 2}, 4, 0x60640020},
+      {{0x1A00, 3}, 4, 0x60610008},
+      {{0x1A00, 0}, 1, 3},
+      {{0x1C13, 1}, 2, 0x1A00},
+      {{0x1C13, 0}, 1, 1},
+      {{0x1C32, 1}, 2, 2},
+      {{0x1C32, 2}, 4, cycle_ns},
+      {{0x60C2, 1}, 1, period.mantissa},
+      {{0x60C2, 2}, 1, static_cast<std::uint8_t>(period.exponent)},
+      {{0x6060, 0}, 1, 8},
+  }};
+}
+
+/// Where the mapping above puts things in the process data of one drive.
+namespace csp {
+inline constexpr std::size_t kOutputSize = 7;
+inline constexpr std::size_t kInputSize = 7;
+inline constexpr std::int8_t kMode = 8;
+
+struct Inputs {
+  std::uint16_t statusword = 0;
+  std::int32_t position = 0;
+  std::int8_t mode = 0;
+  /// bytes.size() must be at least kInputSize.
+  [[nodiscard]] static Inputs decode(ConstBytes bytes) noexcept {
+    return {load<std::uint16_t>(bytes, 0), static_cast<std::int32_t>(load<std::uint32_t>(bytes, 2)),
+            static_cast<std::int8_t>(bytes[6])};
+  }
+};
+
+struct Outputs {
+  std::uint16_t controlword = 0;
+  std::int32_t target = 0;
+  std::int8_t mode = kMode;
+  /// bytes.size() must be at least kOutputSize.
+  void encode(Bytes bytes) const noexcept {
+    store(bytes, 0, controlword);
+    store(bytes, 2, static_cast<std::uint32_t>(target));
+    bytes[6] = static_cast<std::uint8_t>(mode);
+  }
+};
+}  // namespace csp
+
+}  // namespace ftcs::ethercat

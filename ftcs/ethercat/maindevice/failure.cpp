@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/ethercat/maindevice/failure.h"
+
+namespace ftcs::ethercat {
+
+const char* name(FailureKind kind) noexcept {
+  switch (kind) {
+    case FailureKind::kNone:
+      return "no failure";
+    case FailureKind::kNoReply:
+      return "no reply";
+    case FailureKind::kNoSubDevices:
+      return "no SubDevices";
+    case FailureKind::kTooManySubDevices:
+      return "too many SubDevices";
+    case FailureKind::kFewerThanConfigured:
+      return "fewer SubDevices than configured";
+    case FailureKind::kNotAnswering:
+      return "SubDevice does not answer";
+    case FailureKind::kImpossibleTopology:
+      return "impossible topology";
+    case FailureKind::kBadSii:
+      return "bad SII";
+    case FailureKind::kSiiTimeout:
+      return "SII stays busy";
+    case FailureKind::kStateRefused:
+      return "state refused";
+    case FailureKind::kStateTimeout:
+      return "state not reached in time";
+    case FailureKind::kSdoAborted:
+      return "SDO aborted";
+    case FailureKind::kSdoTimeout:
+      return "SDO not answered";
+    case FailureKind::kSdoMalformed:
+      return "SDO answer malformed";
+    case FailureKind::kProcessImageTooLarge:
+      return "process data larger than one frame";
+    case FailureKind::kNoDistributedClock:
+      return "no SubDevice with a distributed clock";
+    case FailureKind::kWorkingCounter:
+      return "working counter wrong";
+    case FailureKind::kLinkLost:
+      return "frames lost";
+  }
+  return "unknown failure";
+}
+
+}  // namespace ftcs::ethercat

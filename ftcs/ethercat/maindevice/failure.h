@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/ethercat/wire/al_state.h"
+#include "ftcs/ethercat/wire/mailbox.h"
+#include "ftcs/ethercat/wire/sii.h"
+
+namespace ftcs::ethercat {
+
+enum class FailureKind : std::uint8_t {
+  kNone,
+  kNoReply,              ///< frames go out and none comes back
+  kNoSubDevices,         ///< frames come back untouched
+  kTooManySubDevices,    ///< more than the capacity of this MainDevice
+  kFewerThanConfigured,  ///< expected, received
+  kNotAnswering,         ///< a SubDevice that was counted does not answer to its address
+  kImpossibleTopology,   ///< the ports that are open do not form a tree of what was counted
+  kBadSii,               ///< sii tells what is wrong
+  kSiiTimeout,
+  kStateRefused,  ///< wanted, actual and code tell which transition and why
+  kStateTimeout,
+  kSdoAborted,  ///< object and abort
+  kSdoTimeout,
+  kSdoMalformed,          ///< mailbox tells what is wrong
+  kProcessImageTooLarge,  ///< more than one frame holds
+  kNoDistributedClock,    ///< nobody can be the reference
+  kWorkingCounter,        ///< too many cycles in a row; expected, received
+  kLinkLost,              ///< too many lost frames in a row
+};
+[[nodiscard]] const char* name(FailureKind kind) noexcept;
+
+/// What went wrong and whose fault it is. Fields that do not belong to the kind are at rest.
+struct Failure {
+  static constexpr std::uint16_t kNobody = 0xFFFF;
+  FailureKind kind = FailureKind::kNone;
+  std::uint16_t position = kNobody;  ///< of the SubDevice on the wire
+  std::uint16_t expected = 0;
+  std::uint16_t received = 0;
+  AlState wanted = AlState::kNone;
+  AlState actual = AlState::kNone;
+  AlStatusCode code = AlStatusCode::kNoError;
+  ObjectAddress object{};
+  SdoAbort abort = SdoAbort::kNone;
+  SiiError sii = SiiError::kTooShort;
+  MailboxError mailbox = MailboxError::kTooShort;
+
+  [[nodiscard]] constexpr explicit operator bool() const noexcept {
+    return kind != FailureKind::kNone;
+  }
+};
+
+}  // namespace ftcs::ethercat

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/ethercat/maindevice/main_device.h"
+
+namespace ftcs::ethercat {
+
+namespace {
+/// The way to SAFEOP is announced more than once: on a bad line one frame may not arrive.
+constexpr std::uint32_t kStopFrames = 5;
+}  // namespace
+
+const char* name(Stage stage) noexcept {
+  switch (stage) {
+    case Stage::kScan:
+      return "scan";
+    case Stage::kClocks:
+      return "clocks";
+    case Stage::kConfigure:
+      return "configure";
+    case Stage::kCyclic:
+      return "cyclic";
+    case Stage::kStopping:
+      return "stopping";
+    case Stage::kStopped:
+      return "stopped";
+  }
+  return "unknown";
+}
+
+MainDevice::MainDevice(const MainDeviceConfig& config) noexcept : config_(config) {
+  scanner_.start(config.expected_subdevices, config.sii_timeout);
+}
+
+ConstBytes MainDevice::next_frame() noexcept {
+  if (outstanding_) on_timeout();
+  if (stage_ == Stage::kStopped) return {};
+  FrameWriter writer(buffer_, ++index_);
+  write_frame(writer);
+  const auto frame = writer.finish();
+  if (!frame) return {};
+  datagrams_ = 0;
+  const auto written = FrameView::parse(Bytes{buffer_}.first(frame->size()));
+  if (!written || written->count() > kMaxDatagrams) return {};
+  for (const Datagram datagram : *written) {
+    sizes_[datagrams_++] = static_cast<std::uint16_t>(datagram.data().size());
+  }
+  outstanding_ = true;
+  ++counters_.sent;
+  return *frame;
+}
+
+void MainDevice::write_frame(FrameWriter& writer) noexcept {
+  switch (stage_) {
+    case Stage::kScan:
+      return scanner_.request(writer, network_);
+    case Stage::kClocks:
+      return clock_setup_.request(writer, network_);
+    case Stage::kConfigure:
+      configurator_.request(writer, network_);
+      // The clocks must not drift apart while the rest is being configured.
+      if (clocks_wanted()) {
+        writer.add(network_.devices[network_.reference].target(Command::kFrmw, reg::kSystemTime),
+                   8);
+      }
+      return;
+    case Stage::kCyclic:
+      return exchange_.request(writer, network_);
+    case Stage::kStopping:
+      writer.add_value({Command::kBwr, 0, reg::kAlControl},
+                       static_cast<std::uint16_t>(AlState::kSafeOp));
+      return;
+    case Stage::kStopped:
+      return;
+  }
+}
+
+/// The reply has the index, and as many datagrams, of what was sent.
+bool MainDevice::answers(const FrameView& frame) const noexcept {
+  if (!outstanding_ || frame.count() != datagrams_) return false;
+  const Datagram first = frame[0];
+  const bool same_command = static_cast<std::uint8_t>(first.command()) == buffer_[kFrameHeaderSize];
+  if (first.index() != index_ || !same_command) return false;
+  std::size_t n = 0;
+  for (const Datagram datagram : frame) {
+    if (datagram.data().size() != sizes_[n++]) return false;
+  }
+  return true;
+}
+
+FrameOutcome MainDevice::on_frame(Bytes bytes, const FrameStamps& stamps) noexcept {
+  const auto frame = FrameView::parse(bytes);
+  if (!frame || !answers(*frame)) {
+    ++counters_.ignored;
+    return FrameOutcome::kIgnored;
+  }
+  outstanding_ = false;
+  retries_ = 0;
+  counters_.lost_in_a_row = 0;
+  switch (stage_) {
+    case Stage::kScan:
+      return advance(scanner_.reply(*frame, network_, stamps.received, failure_));
+    case Stage::kClocks:
+      return advance(clock_setup_.reply(*frame, network_, stamps.sent, failure_));
+    case Stage::kConfigure:
+      return advance(configurator_.reply(*frame, network_, stamps.received, failure_));
+    case Stage::kCyclic:
+      cycle_ = exchange_.reply(*frame, network_);
+      return finish_cycle();
+    case Stage::kStopping:
+      if (--stop_frames_ > 0) return FrameOutcome::kProgress;
+      stage_ = Stage::kStopped;
+      break;
+    case Stage::kStopped:
+      break;
+  }
+  return FrameOutcome::kStopped;
+}
+
+FrameOutcome MainDevice::advance(Progress progress) noexcept {
+  if (progress == Progress::kContinue) return FrameOutcome::kProgress;
+  if (progress == Progress::kFailed) {
+    stage_ = Stage::kStopped;
+    return FrameOutcome::kStopped;
+  }
+  if (stage_ == Stage::kScan && clocks_wanted()) {
+    clock_setup_.start(config_.clocks);
+    stage_ = Stage::kClocks;
+    return FrameOutcome::kProgress;
+  }
+  if (stage_ == Stage::kScan && !config_.distributed_clocks) {
+    network_.reference = Network::kNoReference;
+  }
+  if (stage_ == Stage::kConfigure) {
+    exchange_.start(network_);
+    stage_ = Stage::kCyclic;
+    return FrameOutcome::kProgress;
+  }
+  if (config_.scan_only) {
+    stage_ = Stage::kStopped;
+    return FrameOutcome::kStopped;
+  }
+  configurator_.start(config_.process);
+  stage_ = Stage::kConfigure;
+  return FrameOutcome::kProgress;
+}
+
+FrameOutcome MainDevice::finish_cycle() noexcept {
+  if (cycle_.inputs_valid) {
+    counters_.wrong_in_a_row = 0;
+    return FrameOutcome::kCycle;
+  }
+  ++counters_.wrong_working_counter;
+  if (++counters_.wrong_in_a_row >= config_.working_counter_limit) {
+    begin_stop({.kind = FailureKind::kWorkingCounter,
+                .expected = cycle_.expected,
+                .received = cycle_.working_counter});
+  }
+  return FrameOutcome::kCycle;
+}
+
+FrameOutcome MainDevice::on_timeout() noexcept {
+  if (!outstanding_) return FrameOutcome::kIgnored;
+  outstanding_ = false;
+  ++counters_.lost;
+  if (stage_ == Stage::kCyclic) {
+    if (++counters_.lost_in_a_row >= config_.lost_frame_limit) {
+      begin_stop({.kind = FailureKind::kLinkLost,
+                  .received = static_cast<std::uint16_t>(counters_.lost_in_a_row)});
+    }
+    return FrameOutcome::kCycle;
+  }
+  if (stage_ == Stage::kStopping && --stop_frames_ == 0) {
+    stage_ = Stage::kStopped;
+    return FrameOutcome::kStopped;
+  }
+  if (stage_ != Stage::kStopping && ++retries_ > config_.retries) {
+    failure_ = {.kind = FailureKind::kNoReply};
+    stage_ = Stage::kStopped;
+    return FrameOutcome::kStopped;
+  }
+  return FrameOutcome::kProgress;
+}
+
+void MainDevice::request_operational() noexcept {
+  for (std::size_t n = 0; n < network_.count; ++n) {
+    exchange_.request_state(n, static_cast<std::uint16_t>(AlState::kOp));
+  }
+}
+
+void MainDevice::recover(std::size_t position) noexcept {
+  const SubDeviceInfo& device = network_.devices[position];
+  constexpr auto kSafeOp = static_cast<std::uint16_t>(AlState::kSafeOp);
+  if (device.error) {
+    exchange_.request_state(position, kSafeOp | kAlErrorFlag);
+  } else if (device.state == AlState::kSafeOp) {
+    exchange_.request_state(position, static_cast<std::uint16_t>(AlState::kOp));
+  }
+}
+
+void MainDevice::begin_stop(const Failure& failure) noexcept {
+  failure_ = failure;
+  stop_frames_ = kStopFrames;
+  stage_ = stage_ == Stage::kStopped ? Stage::kStopped : Stage::kStopping;
+}
+
+}  // namespace ftcs::ethercat

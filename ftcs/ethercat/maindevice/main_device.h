@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ftcs/ethercat/maindevice/clock_setup.h"
+#include "ftcs/ethercat/maindevice/configurator.h"
+#include "ftcs/ethercat/maindevice/cyclic_exchange.h"
+#include "ftcs/ethercat/maindevice/network.h"
+#include "ftcs/ethercat/maindevice/scanner.h"
+
+namespace ftcs::ethercat {
+
+struct MainDeviceConfig {
+  std::size_t expected_subdevices = 0;  ///< zero: any number
+  bool scan_only = false;               ///< stop in INIT after scan and clock setup
+  bool distributed_clocks = true;
+  ClockSetupConfig clocks;
+  ConfiguratorConfig process;
+  std::uint32_t retries = 5;  ///< of one frame during the bring-up
+  /// Consecutive cycles without a frame, or with a wrong working counter, before all SubDevices are
+  /// sent to SAFEOP.
+  std::uint32_t lost_frame_limit = 10;
+  std::uint32_t working_counter_limit = 10;
+  Nanoseconds sii_timeout{1'000'000'000};
+};
+
+enum class Stage : std::uint8_t {
+  kScan,
+  kClocks,
+  kConfigure,
+  kCyclic,    ///< frames leave at the cycle's instants; SAFEOP, or OP once it was asked for
+  kStopping,  ///< everybody is being sent to SAFEOP
+  kStopped,   ///< nothing more to send: failure() tells why, if not on request
+};
+[[nodiscard]] const char* name(Stage stage) noexcept;
+
+/// When a frame went out and came back, on the MainDevice's clock.
+struct FrameStamps {
+  LocalTime sent;
+  LocalTime received;
+};
+
+enum class FrameOutcome : std::uint8_t {
+  kIgnored,   ///< not the answer that was waited for: foreign, malformed, or late
+  kProgress,  ///< ask for the next frame at once
+  kCycle,     ///< last_cycle() is new
+  kStopped,
+};
+
+struct CycleCounters {
+  std::uint64_t sent = 0;
+  std::uint64_t lost = 0;
+  std::uint64_t wrong_working_counter = 0;
+  std::uint64_t ignored = 0;
+  std::uint32_t lost_in_a_row = 0;
+  std::uint32_t wrong_in_a_row = 0;
+};
+
+/// The EtherCAT MainDevice without a socket and without a clock: asks for frames to be sent and
+/// takes what came back or did not. Before the cyclic stage the caller sends the next frame as soon
+/// as the last is answered; in it, at each cycle's instant.
+class MainDevice {
+ public:
+  explicit MainDevice(const MainDeviceConfig& config) noexcept;
+
+  /// The next frame (from the EtherCAT header on), valid until the next call. Empty when stopped. A
+  /// frame that is still out counts as lost.
+  [[nodiscard]] ConstBytes next_frame() noexcept;
+  /// What came back; the bytes are read in place.
+  FrameOutcome on_frame(Bytes frame, const FrameStamps& stamps) noexcept;
+  FrameOutcome on_timeout() noexcept;
+
+  /// In the cyclic stage: ask all SubDevices for OP.
+  void request_operational() noexcept;
+  /// Acknowledge the error of one SubDevice and bring it back to what the others are in.
+  void recover(std::size_t position) noexcept;
+  void stop() noexcept { begin_stop({}); }
+
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
+  [[nodiscard]] bool cyclic() const noexcept { return stage_ == Stage::kCyclic; }
+  [[nodiscard]] const Failure& failure() const noexcept { return failure_; }
+  [[nodiscard]] const Network& network() const noexcept { return network_; }
+  [[nodiscard]] const CycleReport& last_cycle() const noexcept { return cycle_; }
+  [[nodiscard]] const CycleCounters& counters() const noexcept { return counters_; }
+  /// System time of the first SYNC0.
+  [[nodiscard]] std::uint64_t sync0_start() const noexcept { return configurator_.sync0_start(); }
+
+  [[nodiscard]] Bytes outputs(std::size_t position) noexcept {
+    return exchange_.outputs(network_.devices[position]);
+  }
+  [[nodiscard]] ConstBytes inputs(std::size_t position) const noexcept {
+    return exchange_.inputs(network_.devices[position]);
+  }
+
+ private:
+  void write_frame(FrameWriter& writer) noexcept;
+  [[nodiscard]] bool answers(const FrameView& frame) const noexcept;
+  FrameOutcome advance(Progress progress) noexcept;
+  FrameOutcome finish_cycle() noexcept;
+  void begin_stop(const Failure& failure) noexcept;
+  [[nodiscard]] bool clocks_wanted() const noexcept {
+    return config_.distributed_clocks && network_.has_reference();
+  }
+
+  MainDeviceConfig config_;
+  Stage stage_ = Stage::kScan;
+  Failure failure_;
+  Network network_;
+  Scanner scanner_;
+  ClockSetup clock_setup_;
+  Configurator configurator_;
+  CyclicExchange exchange_;
+  CycleReport cycle_;
+  CycleCounters counters_;
+
+  std::array<std::uint8_t, kMaxFrameSize> buffer_{};
+  /// 1500 bytes hold no more of the smallest useful datagrams.
+  static constexpr std::size_t kMaxDatagrams = 115;
+  std::array<std::uint16_t, kMaxDatagrams> sizes_{};  ///< of the frame that is out
+  std::size_t datagrams_ = 0;
+  std::uint8_t index_ = 0;
+  bool outstanding_ = false;
+  std::uint32_t retries_ = 0;
+  std::uint32_t stop_frames_ = 0;
+};
+
+}  // namespace ftcs::ethercat

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ftcs/ethercat/maindevice/network.h"
+#include "ftcs/ethercat/maindevice/procedure.h"
+
+namespace ftcs::ethercat {
+
+/// Finds out what is there: counts, resets to INIT, gives station addresses, reads identity, links
+/// and SII, and resolves the topology. SubDevices of one product share one reading of the SII.
+class Scanner {
+ public:
+  /// `expected`: how many there must be at least; zero: any number.
+  void start(std::size_t expected, Nanoseconds timeout) noexcept;
+  void request(FrameWriter& writer, const Network& network) noexcept;
+  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime now,
+                               Failure& failure) noexcept;
+
+ private:
+  enum class Step : std::uint8_t { kCount, kReset, kAddress, kIdentify, kReadSii, kPollSii };
+  [[nodiscard]] Progress count(const FrameView& frame, Network& network, Failure& failure) noexcept;
+  [[nodiscard]] Progress addressed(const FrameView& frame, Network& network,
+                                   Failure& failure) noexcept;
+  [[nodiscard]] Progress identify(const FrameView& frame, Network& network, LocalTime now,
+                                  Failure& failure) noexcept;
+  [[nodiscard]] Progress read_sii(const FrameView& frame, Network& network, LocalTime now,
+                                  Failure& failure) noexcept;
+  [[nodiscard]] Progress next_sii_word(Network& network, Failure& failure) noexcept;
+  [[nodiscard]] bool take_from_twin(Network& network) const noexcept;
+  [[nodiscard]] bool end_seen() noexcept;
+  [[nodiscard]] Progress finish(Network& network, Failure& failure) noexcept;
+  void write_reset(FrameWriter& writer) noexcept;
+  [[nodiscard]] std::uint16_t position() const noexcept {
+    return static_cast<std::uint16_t>(device_);
+  }
+
+  /// Larger images than this carry nothing that is needed.
+  static constexpr std::size_t kImageSize = 4096;
+  Step step_ = Step::kCount;
+  std::size_t expected_ = 0;
+  Nanoseconds timeout_{};
+  std::size_t device_ = 0;
+  LocalTime deadline_;
+  bool deadline_set_ = false;
+  std::array<std::uint8_t, kImageSize> image_{};
+  std::size_t image_used_ = 0;
+  std::size_t category_at_ = 0;
+};
+
+}  // namespace ftcs::ethercat

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "ftcs/ethercat/maindevice/network.h"
+#include "ftcs/ethercat/maindevice/procedure.h"
+
+namespace ftcs::ethercat {
+
+/// One object to be written while a SubDevice is configured.
+struct SdoDownload {
+  ObjectAddress object;
+  std::uint8_t size = 0;  ///< 1, 2 or 4 bytes
+  std::uint32_t value = 0;
+};
+
+/// One SDO at a time: writes the request into the SubDevice's receive mailbox and reads its send
+/// mailbox until the answer is there. An answer to an earlier, repeated request is passed over.
+class SdoClient {
+ public:
+  void start_download(const SdoDownload& download, Nanoseconds timeout) noexcept;
+  void start_upload(ObjectAddress object, Nanoseconds timeout) noexcept;
+  void request(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
+  [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, LocalTime now,
+                               Failure& failure) noexcept;
+  /// What an upload brought, up to four bytes.
+  [[nodiscard]] std::uint32_t value() const noexcept { return value_; }
+
+ private:
+  void start(Nanoseconds timeout) noexcept;
+  enum class Step : std::uint8_t { kSend, kReceive };
+  Step step_ = Step::kSend;
+  SdoKind kind_ = SdoKind::kUploadRequest;
+  SdoDownload object_;
+  Nanoseconds timeout_{};
+  LocalTime deadline_;
+  bool deadline_set_ = false;
+  std::uint8_t counter_ = 0;
+  std::uint32_t value_ = 0;
+};
+
+}  // namespace ftcs::ethercat
