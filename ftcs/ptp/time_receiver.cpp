@@ -93,6 +93,7 @@ ActionList TimeReceiver::on_link_up(FreeRunningTime) noexcept {
 
 ActionList TimeReceiver::on_servo_locked(FreeRunningTime) noexcept {
   ActionList actions;
+  servo_locked_ = true;
   if (state_ == PortState::kUncalibrated) {
     change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
   }
@@ -101,6 +102,7 @@ ActionList TimeReceiver::on_servo_locked(FreeRunningTime) noexcept {
 
 ActionList TimeReceiver::on_servo_unlocked(FreeRunningTime) noexcept {
   ActionList actions;
+  servo_locked_ = false;
   if (state_ == PortState::kTimeReceiver) {
     change_state(PortState::kUncalibrated, PortEvent::kSynchronizationFault, actions);
   }
@@ -262,7 +264,10 @@ void TimeReceiver::select(const TransmitterData& data, ActionList& actions) noex
   transmitter_ = data;
   has_transmitter_ = true;
   had_transmitter_ = true;
-  if (changed) counters_.add(Counter::kTransmitterChanges);
+  if (changed) {
+    counters_.add(Counter::kTransmitterChanges);
+    servo_locked_ = false;  // locked to something else
+  }
   push(TransmitterSelected{data, changed}, actions);
   if (same_port) return;
   forget_exchanges();
@@ -299,6 +304,9 @@ void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
   if (pair->direction == Direction::kForward) {
     counters_.add(Counter::kForwardPairs);
     check_for_jump(*pair, now, actions);
+    if (servo_locked_ && state_ == PortState::kUncalibrated) {
+      change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
+    }
   } else {
     counters_.add(Counter::kBackwardPairs);
   }

@@ -66,7 +66,9 @@ class TimeReceiver {
   [[nodiscard]] ActionList on_link_down(FreeRunningTime now) noexcept;
   /// From FAULTY to LISTENING.
   [[nodiscard]] ActionList on_link_up(FreeRunningTime now) noexcept;
-  /// UNCALIBRATED to SLAVE.
+  /// UNCALIBRATED to SLAVE. It holds until on_servo_unlocked() or another reference: if the same
+  /// transmitter returns after a fault and the servo has never lost lock, the next forward pair
+  /// leads back to SLAVE.
   [[nodiscard]] ActionList on_servo_locked(FreeRunningTime now) noexcept;
   /// SLAVE to UNCALIBRATED.
   [[nodiscard]] ActionList on_servo_unlocked(FreeRunningTime now) noexcept;
@@ -124,6 +126,7 @@ class TimeReceiver {
   SyncMatcher matcher_;
   DelayRequests delay_requests_;
   LastPair last_forward_;
+  bool servo_locked_ = false;
   Counters counters_;
 };
 

@@ -30,6 +30,29 @@ TEST_F(Receiver, a_transmitter_that_returns_is_no_new_reference) {
   EXPECT_FALSE(selected[0].changed);
 }
 
+TEST_F(Receiver, a_servo_that_stayed_locked_is_believed_when_the_same_transmitter_returns) {
+  select_a();
+  static_cast<void>(receiver_.on_servo_locked(local(1s)));
+  static_cast<void>(receiver_.on_timer(local(4s)));
+  select_a(5s);
+  EXPECT_EQ(receiver_.state(), PortState::kUncalibrated);
+  const auto changes = of<PortStateChanged>(exchange(1, 6s));
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].event, PortEvent::kTransmitterClockSelected);
+  EXPECT_EQ(receiver_.state(), PortState::kTimeReceiver);
+}
+
+TEST_F(Receiver, a_lock_to_one_reference_says_nothing_about_another) {
+  select_a();
+  static_cast<void>(receiver_.on_servo_locked(local(1s)));
+  static_cast<void>(general(announce_from(kB, 1), 1s));
+  static_cast<void>(general(announce_from(kB, 1), 2s));
+  ASSERT_EQ(receiver_.transmitter()->port, kB);
+  Message sync = message_from(kB, 1, Sync{reference(2s)});
+  EXPECT_EQ(of<EmitPair>(event(sync, 2s)).size(), 1U);
+  EXPECT_EQ(receiver_.state(), PortState::kUncalibrated);
+}
+
 TEST_F(Receiver, a_better_transmitter_takes_over_and_open_exchanges_do_not_mix) {
   select_a();
   static_cast<void>(receiver_.on_servo_locked(local(300ms)));
