@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/servo/ftcs_servo.h"
 
+#include <algorithm>
+
 namespace ftcs {
 namespace {
 
@@ -8,9 +10,7 @@ namespace {
 /// T_c), however late the command comes. A command that is later than half of T_c would need more
 /// than twice the rate: it takes its half of T_c all the same.
 Duration remaining_time(Duration correction_time, Duration latency) noexcept {
-  const Duration remaining = correction_time - latency;
-  const Duration shortest = correction_time.half();
-  return remaining < shortest ? shortest : remaining;
+  return std::max(correction_time - latency, correction_time.half());
 }
 
 }  // namespace

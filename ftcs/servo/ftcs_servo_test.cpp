@@ -111,6 +111,22 @@ TEST(FtcsServo, latency_between_sample_and_command_costs_nothing) {
   EXPECT_NEAR(plant.offset_ns(), 0.0, 1e-6);
 }
 
+TEST(FtcsServo, the_correction_ends_one_correction_time_after_the_sample) {
+  // The reference runs 0.1 % fast: 10 ms of oscillator are 10.01 ms of it.
+  const auto correction_time_after = [](Nanoseconds latency) {
+    FtcsServo servo{deadbeat()};
+    const SyncSample first = sample_at(0, 0);
+    const SyncSample second = sample_at(125'125'000, 125'000'000);
+    (void)servo.update(first, at(first));
+    return servo.update(second, {second.free_running + latency, second.local + latency})
+        .command.correction_time.ns();
+  };
+  EXPECT_NEAR(correction_time_after(10ms), 125e6 - 10.01e6, 1e-3);
+  EXPECT_NEAR(correction_time_after(62ms), 125e6 - 62.062e6, 1e-3);
+  EXPECT_EQ(correction_time_after(63ms), 62.5e6);  // no less than half of T_c
+  EXPECT_EQ(correction_time_after(1s), 62.5e6);
+}
+
 TEST(FtcsServo, a_change_of_the_path_delay_does_not_look_like_frequency) {
   FtcsServo servo{deadbeat()};
   SyncSample first = sample_at(0, 0);

@@ -15,6 +15,8 @@ struct TwoWayConfig {
   /// A path delay known otherwise (peer delay, wiring): backward messages are then not used. May be
   /// set to zero.
   std::optional<Nanoseconds> fixed_path_delay{};
+  /// Has an effect only where the path delay is rate compensated: without that, there is no rate to
+  /// predict by.
   bool gate_enabled = true;
   OutlierGateConfig gate{};
 };
@@ -62,8 +64,8 @@ class TwoWayServo {
     return config_.fixed_path_delay.has_value() ? Duration{*config_.fixed_path_delay}
                                                 : delay_.path_delay();
   }
-  /// The stamp that the path delay is measured with. Not rate compensated means as linuxptp does it:
-  /// on the steered clock, whatever was done to it in the meantime.
+  /// The stamp that the path delay is measured with. Not rate compensated means as linuxptp does
+  /// it: on the steered clock, whatever was done to it in the meantime.
   [[nodiscard]] FreeRunningTime delay_stamp(const TimestampPair& pair) const noexcept {
     return config_.path_delay.rate_compensated ? pair.free_running
                                                : FreeRunningTime{pair.local.since_epoch()};
@@ -77,12 +79,11 @@ class TwoWayServo {
   }
 
   [[nodiscard]] GateDecision judge(const TimestampPair& pair) noexcept {
-    if (!config_.gate_enabled || !has_accepted_ || !delay_.rate_known()) {
-      return GateDecision::kAccept;
-    }
+    const bool rate_known = config_.path_delay.rate_compensated && delay_.rate_known();
+    if (!config_.gate_enabled || !has_accepted_ || !rate_known) return GateDecision::kAccept;
     const ReferenceTime predicted =
         accepted_.reference +
-        scale(delay_stamp(pair) - delay_stamp(accepted_), delay_.rate_ratio());
+        scale(pair.free_running - accepted_.free_running, delay_.rate_ratio());
     return gate_.decide(predicted - pair.reference);  // positive: arrived late
   }
 

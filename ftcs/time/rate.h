@@ -59,7 +59,7 @@ struct RateLimits {
   /// Nearest permitted rate; a rate that is not a number becomes the nominal one.
   // On plain doubles: the three-way comparison of Rates costs ten times as much here.
   [[nodiscard]] constexpr Rate clamp(Rate rate) const noexcept {
-    if (rate.ratio() != rate.ratio()) return clamp(Rate{});
+    if (rate.ratio() != rate.ratio()) rate = Rate{};
     if (rate.ratio() < slowest.ratio()) return slowest;
     return rate.ratio() > fastest.ratio() ? fastest : rate;
   }
