@@ -181,10 +181,14 @@ std::uint64_t PtpReceiver::samples_per_summary() const {
   return samples < 2.0 ? 1 : static_cast<std::uint64_t>(samples);
 }
 
+// From the port's state and not from a change of the lock: after a fault shorter than the lock's
+// patience the port comes back uncalibrated while the clock has been locked all along.
 void PtpReceiver::follow_lock(bool locked) {
-  if (locked == was_locked_) return;
-  was_locked_ = locked;
-  perform(locked ? core_.on_servo_locked(now()) : core_.on_servo_unlocked(now()));
+  if (locked && core_.state() == ptp::PortState::kUncalibrated) {
+    perform(core_.on_servo_locked(now()));
+  } else if (!locked && core_.state() == ptp::PortState::kTimeReceiver) {
+    perform(core_.on_servo_unlocked(now()));
+  }
 }
 
 void PtpReceiver::housekeeping(FreeRunningTime) {
@@ -195,7 +199,7 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
           options().interface);
   }
   in_holdover_ = holdover;
-  follow_lock(telemetry.locked);
+  if (!telemetry.locked) follow_lock(false);  // only a sample can say that it is locked again
 }
 
 int PtpReceiver::finish() {

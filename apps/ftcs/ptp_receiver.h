@@ -43,7 +43,6 @@ class PtpReceiver final : public PtpPort {
   SampleSummary recent_;
   SampleSummary since_lock_;
   bool had_transmitter_ = false;
-  bool was_locked_ = false;
   bool in_holdover_ = false;
 };
 

@@ -11,9 +11,11 @@
 namespace ftcs::app {
 namespace {
 
-// ptp4l's "freq": positive when the local clock runs fast, so that it is slowed down.
+// ptp4l's "freq": positive when the local clock runs fast, so that it is slowed down; while nothing
+// is steered, the estimate.
 double ptp4l_frequency_ppb(const Telemetry& telemetry) {
-  return 0.0 - telemetry.applied_rate.ppb();
+  const bool unlocked = telemetry.servo.state == ServoState::kUnlocked;
+  return 0.0 - (unlocked ? telemetry.servo.rate_ratio : telemetry.applied_rate).ppb();
 }
 
 int ptp4l_state(ServoState state) {

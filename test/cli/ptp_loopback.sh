@@ -1,0 +1,80 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# A time transmitter and time receivers as processes on loopback, unprivileged ports, no root: lock, output
+# formats, exit codes, signals.
+set -uo pipefail
+
+ftcs=$(realpath "${1:-build/ftcs}")
+folder=$(mktemp -d)
+pids=()
+cleanup() {
+  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null; done
+  wait 2> /dev/null
+  rm -rf "$folder"
+}
+trap cleanup EXIT
+
+fail() {
+  echo "FAILED: $*"
+  for log in "$folder"/*; do echo "--- $(basename "$log")"; tail -n 15 "$log"; done
+  exit 1
+}
+
+# Always in the background: the process becomes the program, so that its pid takes the signals.
+port=$((20000 + 2 * ($$ % 5000)))
+ptp() { exec "$ftcs" ptp -i lo --event-port $port --general-port $((port + 1)) "$@"; }
+
+ptp --role time-transmitter --logSyncInterval -4 --logAnnounceInterval -2 --logMinDelayReqInterval -4 \
+  > "$folder/transmitter" 2>&1 &
+transmitter=$!
+pids+=("$transmitter")
+receive=(--logAnnounceInterval -2 --duration 4)
+
+# Several receivers at once: a machine's loopback has room for them.
+ptp --offset 1ms --skew 50ppm --json "${receive[@]}" > "$folder/json" 2> "$folder/json.log" &
+json=$!
+ptp --offset -1ms --skew -50ppm --csv "${receive[@]}" > "$folder/csv" 2> "$folder/csv.log" &
+csv=$!
+ptp --offset 2s "${receive[@]}" > "$folder/far" 2> "$folder/far.errors" &
+far=$!
+ptp --offset 2s --first-step "${receive[@]}" > "$folder/step" 2>&1 &
+step=$!
+ptp --domainNumber 9 "${receive[@]}" > "$folder/alone" 2>&1 &
+alone=$!
+ptp --servo none --offset 1ms "${receive[@]}" > "$folder/none" 2>&1 &
+none=$!
+ptp > "$folder/interrupted" 2>&1 &
+interrupted=$!
+pids+=($json $csv $far $step $alone $none $interrupted)
+
+wait $json || fail "--json: exit code $?, expected 0 (locked)"
+wait $csv || fail "--csv: exit code $?, expected 0 (locked)"
+wait $step || fail "--first-step: exit code $?, expected 0 (locked)"
+wait $far; [ $? -eq 1 ] || fail "2 s away without --first-step: expected exit code 1"
+grep -q "first offset is 2.000 s, more than 1 s" "$folder/far.errors" || fail "no clear error when 2 s away"
+wait $alone; [ $? -eq 3 ] || fail "nobody transmits in domain 9: expected exit code 3"
+wait $none; [ $? -eq 3 ] || fail "1 ms away and free running: expected exit code 3"
+grep -q "1 steps" "$folder/step" || fail "--first-step: no step"
+
+kill -INT $interrupted
+wait $interrupted || fail "SIGINT while locked: exit code $?, expected 0"
+grep -q "summary: locked" "$folder/interrupted" || fail "SIGINT: no summary"
+kill -TERM $transmitter
+wait $transmitter || fail "SIGTERM: the transmitter's exit code is $?, expected 0"
+grep -q "summary: transmitting" "$folder/transmitter" || fail "SIGTERM: no summary"
+
+# The first correction removes offset and skew in one interval: from 1 ms to what the stamps allow.
+python3 - "$folder/json" "$folder/csv" << 'EOF' || fail "samples"
+import csv, json, sys
+samples = [json.loads(line) for line in open(sys.argv[1])]
+rows = list(csv.DictReader(open(sys.argv[2])))
+assert list(samples[0]) == list(rows[0]), "JSON and CSV fields differ"
+for name, offsets, sign in (
+    ("json", [s["offset_ns"] for s in samples if s["offset_ns"] is not None], 1),
+    ("csv", [float(r["offset_ns"]) for r in rows if r["offset_ns"]], -1),
+):
+    assert 0.5e6 < sign * offsets[0] < 1.5e6, f"{name}: starts at {offsets[0]} ns"
+    assert sorted(map(abs, offsets[1:6]))[2] < 200e3, f"{name}: not corrected: {offsets[:6]}"
+assert samples[-1]["locked"] is True and samples[-1]["state"] == "locked"
+EOF
+echo "loopback: lock, formats, exit codes and signals are as documented"
