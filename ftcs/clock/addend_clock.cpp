@@ -47,10 +47,11 @@ double AddendClockConfig::nominal_addend() const noexcept {
 bool AddendClockConfig::valid() const noexcept {
   constexpr std::uint64_t kHighestFrequency = 1'000'000'000'000;
   constexpr Duration kLargestIncrement = Nanoseconds{1'000'000};
-  const bool in_range = nominal_frequency_hz > 0 && nominal_frequency_hz <= kHighestFrequency &&
-                        accumulator_bits >= 8 && accumulator_bits <= 40 && increment > Duration{} &&
-                        increment <= kLargestIncrement && limits.valid();
-  return in_range && intersect(limits, register_limits(*this)).valid();
+  // A frequency of zero, an increment of zero or below: no addend makes rate 1, and the limits
+  // tell.
+  return nominal_frequency_hz <= kHighestFrequency && accumulator_bits >= 8 &&
+         accumulator_bits <= 40 && increment <= kLargestIncrement && limits.valid() &&
+         intersect(limits, register_limits(*this)).valid();
 }
 
 AddendClock::AddendClock(FreeRunningSource& source, const AddendClockConfig& config) noexcept
@@ -101,8 +102,7 @@ std::int64_t AddendClock::ticks_at(FreeRunningTime instant) const noexcept {
 }
 
 std::uint64_t AddendClock::addend_for(Rate rate) const noexcept {
-  const double addend = limits_.clamp(rate).ratio() * config_.nominal_addend();
-  const double wanted = std::clamp(addend, 1.0, capacity(config_) - 1.0);
+  const double wanted = limits_.clamp(rate).ratio() * config_.nominal_addend();
   const int bits = config_.dither_ticks == 0 ? 0 : kAddendFractionBits;
   const auto rounded = static_cast<std::uint64_t>(std::llround(std::ldexp(wanted, bits)));
   return rounded << (kAddendFractionBits - bits);

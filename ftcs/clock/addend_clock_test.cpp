@@ -246,6 +246,7 @@ TEST(AddendClockConfig, knows_what_cannot_work) {
   EXPECT_TRUE(with([](auto& c) { c.accumulator_bits = 8; }));
   EXPECT_TRUE(with([](auto& c) { c.accumulator_bits = 40; }));
   EXPECT_FALSE(with([](auto& c) { c.increment = Duration{}; }));
+  EXPECT_FALSE(with([](auto& c) { c.increment = Duration{-10ns}; }));
   EXPECT_FALSE(with([](auto& c) { c.increment = Nanoseconds{8}; }));  // at most rate 1 - 2^-16
   EXPECT_FALSE(with([](auto& c) { c.increment = Duration{2ms}; }));
   EXPECT_FALSE(with([](auto& c) { c.limits.slowest = Rate::from_ratio(-1.0); }));

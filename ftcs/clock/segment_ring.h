@@ -8,27 +8,26 @@
 
 namespace ftcs {
 
-/// The last `Capacity` segments of something that is piecewise defined over free-running time. A
-/// segment holds from its start() to the start of its successor; the oldest one also stands for
-/// everything before it. Starts are compared by their difference: correct as long as the ring spans
-/// less than 146 years, wrap included.
+/// The last `Capacity` segments of something that is piecewise defined over free-running time.
+///
+/// Of the segments that have begun at an instant, the one appended last holds. So a new one also
+/// takes the place of what was planned for later (a correction replaced before it expired). Before
+/// all of them the oldest holds. Starts are compared by their difference: correct as long as the
+/// ring spans less than 146 years, wrap included.
 template <class Segment, std::size_t Capacity>
 class SegmentRing {
-  static_assert(Capacity >= 2, "a command makes two segments");
-
  public:
   explicit SegmentRing(const Segment& first) noexcept { segments_[0] = first; }
 
-  /// Appends a segment. Segments that would start at or after it have not come to pass and are
-  /// dropped (a correction that is replaced before it expired; an oscillator that went backward).
+  /// Appends a segment; the oldest one goes if the ring is full.
   void append(const Segment& next) noexcept {
-    while (size_ > 0 && newest(0).start() - next.start() >= Duration{}) --size_;
-    if (size_ == Capacity) {
+    if (size_ < Capacity) {
+      segments_[size_] = next;
+      ++size_;
+    } else {
+      segments_[oldest_] = next;
       oldest_ = (oldest_ + 1) % Capacity;
-      --size_;
     }
-    segments_[(oldest_ + size_) % Capacity] = next;
-    ++size_;
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }

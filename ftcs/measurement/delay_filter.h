@@ -34,26 +34,31 @@ class DelayFilter {
     values_[next_] = value;
     next_ = (next_ + 1) % length_;
     size_ = std::min(size_ + 1, length_);
+    filtered_ = filter();
   }
   [[nodiscard]] constexpr bool empty() const noexcept { return size_ == 0; }
   /// Zero as long as the filter is empty.
-  [[nodiscard]] constexpr Duration value() const noexcept {
-    if (empty()) return {};
+  [[nodiscard]] constexpr Duration value() const noexcept { return filtered_; }
+  constexpr void reset() noexcept {
+    next_ = size_ = 0;
+    filtered_ = Duration{};
+  }
+
+ private:
+  [[nodiscard]] constexpr Duration filter() const noexcept {
     std::array<Duration, kCapacity> sorted = values_;
-    const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(size_);
-    std::sort(sorted.begin(), end);
+    std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(size_));
     if (kind_ == DelayFilterKind::kMovingMinimum) return sorted[0];
     const Duration low = sorted[(size_ - 1) / 2];
     return low + (sorted[size_ / 2] - low).half();
   }
-  constexpr void reset() noexcept { next_ = size_ = 0; }
 
- private:
   DelayFilterKind kind_;
   std::size_t length_;
   std::array<Duration, kCapacity> values_{};
   std::size_t next_ = 0;
   std::size_t size_ = 0;
+  Duration filtered_{};
 };
 
 }  // namespace ftcs

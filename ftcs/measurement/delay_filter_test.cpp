@@ -73,6 +73,7 @@ TEST(DelayFilter, reset_forgets) {
   minimum.add(Duration::from_ns(2.0));
   minimum.reset();
   EXPECT_TRUE(minimum.empty());
+  EXPECT_EQ(minimum.value(), Duration{});
   minimum.add(Duration::from_ns(8.0));
   EXPECT_EQ(minimum.value(), Duration::from_ns(8.0));
   minimum.add(Duration::from_ns(9.0));

@@ -29,6 +29,7 @@ void PathDelayEstimator::on_forward(ReferenceTime origin, FreeRunningTime receiv
   forwards_[forward_next_] = next;
   forward_next_ = (forward_next_ + 1) % kForwards;
   forward_count_ = std::min(forward_count_ + 1, kForwards);
+  rate_ratio_ = measure_rate();
   if (has_deferred_ && rate_known()) {
     has_deferred_ = false;
     complete(deferred_);
@@ -70,7 +71,7 @@ PathDelayUpdate PathDelayEstimator::complete(const Backward& backward) noexcept 
   return {PathDelayVerdict::kUsed, raw};
 }
 
-Rate PathDelayEstimator::rate_ratio() const noexcept {
+Rate PathDelayEstimator::measure_rate() const noexcept {
   std::array<double, kForwards*(kForwards - 1) / 2> deviations{};
   std::size_t count = 0;
   for (std::size_t i = 1; i < forward_count_; ++i) {
@@ -106,6 +107,7 @@ const PathDelayEstimator::Forward& PathDelayEstimator::nearest_forward(
 void PathDelayEstimator::restart() noexcept {
   forward_next_ = forward_count_ = 0;
   has_deferred_ = false;
+  rate_ratio_ = Rate{};
   ++counters_.restarts;
 }
 

@@ -73,7 +73,7 @@ class PathDelayEstimator {
   [[nodiscard]] Duration latest() const noexcept { return latest_; }
   [[nodiscard]] bool rate_known() const noexcept { return forward_count_ >= 2; }
   /// Rate of the reference in units of the free-running oscillator; 1 until known.
-  [[nodiscard]] Rate rate_ratio() const noexcept;
+  [[nodiscard]] Rate rate_ratio() const noexcept { return rate_ratio_; }
   [[nodiscard]] const PathDelayCounters& counters() const noexcept { return counters_; }
 
   /// The next forward message does not continue the last ones: forgets messages and rate, keeps the
@@ -99,6 +99,7 @@ class PathDelayEstimator {
     return forwards_[(forward_next_ + kForwards - 1) % kForwards];
   }
   [[nodiscard]] const Forward& nearest_forward(FreeRunningTime sent) const noexcept;
+  [[nodiscard]] Rate measure_rate() const noexcept;
   [[nodiscard]] bool continues(const Forward& next) const noexcept;
   PathDelayUpdate complete(const Backward& backward) noexcept;
 
@@ -107,6 +108,7 @@ class PathDelayEstimator {
   std::array<Forward, kForwards> forwards_{};
   std::size_t forward_next_ = 0;
   std::size_t forward_count_ = 0;
+  Rate rate_ratio_{};
   bool has_deferred_ = false;
   Backward deferred_{};
   Duration latest_{};

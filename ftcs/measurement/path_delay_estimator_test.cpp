@@ -214,6 +214,37 @@ TEST(PathDelayEstimator, backward_message_needs_a_forward_one_near_by) {
   EXPECT_EQ(estimator.counters().used, 1U);
 }
 
+TEST(PathDelayEstimator, sixteen_seconds_are_near_by) {
+  World world;
+  world.skew = Rate{};
+  world.there = world.back = Duration{};
+  PathDelayEstimator estimator{PathDelayConfig{}};
+  world.forward(estimator, ms(0));
+  world.forward(estimator, ms(1000));
+  EXPECT_EQ(world.backward(estimator, ms(17'000)).verdict, PathDelayVerdict::kUsed);
+  EXPECT_EQ(world.backward(estimator, ms(17'001)).verdict, PathDelayVerdict::kNoPartner);
+}
+
+TEST(PathDelayEstimator, restart_forgets_messages_and_keeps_delays) {
+  const World world;
+  PathDelayEstimator estimator{PathDelayConfig{}};
+  world.forward(estimator, ms(0));
+  world.forward(estimator, ms(125));
+  world.backward(estimator, ms(130));
+  estimator.restart();
+  EXPECT_FALSE(estimator.rate_known());
+  EXPECT_EQ(estimator.rate_ratio(), Rate{});
+  EXPECT_TRUE(estimator.known());
+  EXPECT_EQ(estimator.counters().restarts, 1U);
+  // A message kept for its partner is forgotten too.
+  world.forward(estimator, ms(250));
+  EXPECT_EQ(world.backward(estimator, ms(260)).verdict, PathDelayVerdict::kDeferred);
+  estimator.restart();
+  world.forward(estimator, ms(375));
+  world.forward(estimator, ms(500));
+  EXPECT_EQ(estimator.counters().used, 1U);
+}
+
 TEST(PathDelayEstimator, exact_repetition_of_a_forward_message_is_ignored) {
   const World world;
   PathDelayEstimator estimator{PathDelayConfig{}};

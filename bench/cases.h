@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/clock/virtual_clock.h"
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/measurement/outlier_gate.h"
+#include "ftcs/measurement/path_delay_estimator.h"
+#include "ftcs/ptp/wire/codec.h"
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs::bench {
+
+/// A reference and an oscillator that is 50 ppm fast, seen every 125 ms with some 100 ns of jitter:
+/// what a servo in steady state is given. Integer arithmetic: its few instructions are part of
+/// every figure, and `input_alone` says how much that is.
+class World {
+ public:
+  void next() noexcept {
+    origin_ns_ += kIntervalNs;
+    jitter_state_ = jitter_state_ * 1664525U + 1013904223U;
+    received_ns_ =
+        origin_ns_ + origin_ns_ / 20'000 + static_cast<std::int64_t>(jitter_state_ >> 24);
+    local_ns_ = origin_ns_ + kPathDelayNs + static_cast<std::int64_t>(jitter_state_ >> 24) - 128;
+  }
+  [[nodiscard]] ReferenceTime origin() const noexcept { return ReferenceTime::from_ns(origin_ns_); }
+  [[nodiscard]] FreeRunningTime received() const noexcept {
+    return FreeRunningTime::from_ns(received_ns_);
+  }
+  [[nodiscard]] LocalTime local() const noexcept { return LocalTime::from_ns(local_ns_); }
+  [[nodiscard]] SyncSample sample() const noexcept {
+    return {origin(), Nanoseconds{kPathDelayNs}, local(), received()};
+  }
+  [[nodiscard]] ClockReading now() const noexcept {
+    return {FreeRunningTime::from_ns(received_ns_ + kLatencyNs),
+            LocalTime::from_ns(local_ns_ + kLatencyNs)};
+  }
+  [[nodiscard]] EventPair forward() const noexcept {
+    return {Direction::kForward, origin(), received()};
+  }
+  [[nodiscard]] EventPair backward() const noexcept {
+    return {Direction::kBackward,
+            ReferenceTime::from_ns(origin_ns_ + 2 * kPathDelayNs + kTurnaroundNs),
+            FreeRunningTime::from_ns(received_ns_ + kTurnaroundNs)};
+  }
+
+ private:
+  static constexpr std::int64_t kIntervalNs = 125'000'000;
+  static constexpr std::int64_t kPathDelayNs = 10'000;
+  static constexpr std::int64_t kLatencyNs = 30'000;
+  static constexpr std::int64_t kTurnaroundNs = 1'000'000;
+
+  std::int64_t origin_ns_ = 0;
+  std::int64_t received_ns_ = 0;
+  std::int64_t local_ns_ = 0;
+  std::uint32_t jitter_state_ = 1;
+};
+
+struct InputCase {
+  World world{};
+  SyncSample step() noexcept {
+    world.next();
+    return world.sample();
+  }
+};
+
+/// One update of a control law.
+template <class Law>
+struct LawCase {
+  World world{};
+  Law law{typename Law::Config{}};
+  ServoUpdate step() noexcept {
+    world.next();
+    return law.update(world.sample(), world.now());
+  }
+};
+
+/// One forward message through gate, path delay and control law.
+struct TwoWayCase {
+  World world{};
+  AnyServo servo = make_servo({});
+  ServoUpdate step() noexcept {
+    world.next();
+    const EventPair pair = world.backward();
+    (void)servo.update({pair.direction, pair.reference, {}, pair.free_running}, world.now());
+    return servo.update({Direction::kForward, world.origin(), world.local(), world.received()},
+                        world.now());
+  }
+};
+
+struct BenchSource final : FreeRunningSource {
+  World world{};
+  [[nodiscard]] FreeRunningTime now() noexcept override { return world.now().free_running; }
+};
+
+/// One cycle of the whole way from the protocol's pairs to the clock's registers: Sync, Delay_Req,
+/// command.
+struct DisciplineCase {
+  BenchSource source{};
+  VirtualClock clock{source, {.free_running = {}, .local = {}, .rate = {}, .limits = {}}};
+  ClockDiscipline discipline{DisciplineConfig{}, clock};
+  Telemetry step() noexcept {
+    source.world.next();
+    (void)discipline.on_pair(source.world.forward());
+    return discipline.on_pair(source.world.backward());
+  }
+};
+
+struct ClockApplyCase {
+  BenchSource source{};
+  VirtualClock clock{source, {.free_running = {}, .local = {}, .rate = {}, .limits = {}}};
+  LocalTime step() noexcept {
+    source.world.next();
+    const auto taken = clock.apply({.correction_rate = Rate::from_ppm(100.0),
+                                    .correction_time = Nanoseconds{125'000'000},
+                                    .tracking_rate = Rate::from_ppm(50.0),
+                                    .step = {}});
+    return taken->local;
+  }
+};
+
+struct ClockReadCase {
+  BenchSource source{};
+  VirtualClock clock{source,
+                     {.free_running = {}, .local = {}, .rate = Rate::from_ppm(50.0), .limits = {}}};
+  LocalTime step() noexcept {
+    source.world.next();
+    return clock.read().local;
+  }
+};
+
+struct GateCase {
+  World world{};
+  OutlierGate gate{};
+  GateDecision step() noexcept {
+    world.next();
+    return gate.decide(world.local().since_epoch() - world.origin().since_epoch());
+  }
+};
+
+struct PathDelayCase {
+  World world{};
+  PathDelayEstimator estimator{PathDelayConfig{}};
+  Duration step() noexcept {
+    world.next();
+    estimator.on_forward(world.origin(), world.received());
+    return estimator.on_backward(world.backward().free_running, world.backward().reference).raw;
+  }
+};
+
+/// One message of the given body, as it comes from the socket.
+template <class Body>
+struct DecodeCase {
+  ptp::MessageBytes bytes = ptp::encode(ptp::Message{ptp::Header{}, Body{}}).value();
+  Result<ptp::Message, ptp::DecodeError> step() noexcept {
+    ++bytes.octets[31];  // another sequenceId each time
+    return ptp::decode(bytes.view());
+  }
+};
+
+/// Calls visit(name, a fresh case) for each case.
+template <class Visit>
+void for_each_case(const Visit& visit) {
+  visit("input_alone", InputCase{});
+  visit("ftcs_update", LawCase<FtcsServo>{});
+  visit("pics_update", LawCase<PicsServo>{});
+  visit("linuxptp_pi_update", LawCase<LinuxptpPiServo>{});
+  visit("two_way_servo_cycle", TwoWayCase{});
+  visit("discipline_cycle", DisciplineCase{});
+  visit("virtual_clock_apply", ClockApplyCase{});
+  visit("virtual_clock_read", ClockReadCase{});
+  visit("outlier_gate", GateCase{});
+  visit("path_delay_exchange", PathDelayCase{});
+  visit("decode_sync", DecodeCase<ptp::Sync>{});
+  visit("decode_follow_up", DecodeCase<ptp::FollowUp>{});
+  visit("decode_delay_resp", DecodeCase<ptp::DelayResp>{});
+  visit("decode_announce", DecodeCase<ptp::Announce>{});
+}
+
+}  // namespace ftcs::bench
