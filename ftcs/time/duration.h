@@ -104,12 +104,11 @@ constexpr Duration Duration::from_ns(double ns) noexcept {
   constexpr double kLimit = 4611686018427387904.0;  // 2^62 ns, 146 years
   if (!(ns > -kLimit)) return ns != ns ? Duration{} : from_whole_ns(-(std::int64_t{1} << 62));
   if (!(ns < kLimit)) return from_whole_ns(std::int64_t{1} << 62);
-  auto whole = static_cast<std::int64_t>(ns);
-  double rest = ns - static_cast<double>(whole);  // exact: both have the same exponent or smaller
-  if (rest < 0.0) {
-    rest += 1.0;
-    --whole;
-  }
+  const auto truncated = static_cast<std::int64_t>(ns);
+  // Subtracted, not branched upon: the sign of noise cannot be predicted.
+  const std::int64_t whole =
+      truncated - static_cast<std::int64_t>(ns < static_cast<double>(truncated));
+  const double rest = ns - static_cast<double>(whole);
   const auto fraction = static_cast<std::uint64_t>(rest / kFractionUnit + 0.5);
   return from_parts(whole + static_cast<std::int64_t>(fraction >> 32),
                     static_cast<std::uint32_t>(fraction));
