@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/servo/adaptive/adaptive_servo.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -13,6 +14,12 @@ using adaptive::Observation;
 /// T_c as a part of the sync interval: shorter follows changes more closely, at the price of
 /// larger rate swings; below a quarter little is gained.
 constexpr double kCorrectionShare = 0.25;
+/// A clock half as fast or one and a half times as fast as the other is broken.
+constexpr double kPlausibleDeviation = 0.5;
+/// 2^40 ns, 18 minutes: resolved to 2^-12 ns.
+constexpr double kLargestOffsetNs = 1099511627776.0;
+/// The delay shifts the moment to which a message belongs; more than this is not believed there.
+constexpr double kLongestDelayNs = 1e9;
 
 adaptive::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
   if (!config.fixed_path_delay.has_value()) return {};
@@ -22,9 +29,6 @@ adaptive::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
 
 double sign_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 1.0 : -1.0;
-}
-std::size_t index_of(Direction direction) noexcept {
-  return direction == Direction::kForward ? 0 : 1;
 }
 
 }  // namespace
@@ -50,57 +54,56 @@ BasicAdaptiveServo<Grid, Window>::BasicAdaptiveServo(const AdaptiveConfig& confi
 
 template <class Grid, std::size_t Window>
 void BasicAdaptiveServo<Grid, Window>::reset() noexcept {
-  // In place: a temporary would be kilobytes on the stack.
-  std::construct_at(&estimator_, known_delay(config_));
+  forget();
+  order_.reset();
   steering_.reset();
-  interval_ns_ = static_cast<double>(config_.sync_interval.count());
-  interval_known_ = interval_ns_ > 0.0;
-  if (!interval_known_) interval_ns_ = 1e9;
-  started_ = false;
-  has_latest_[0] = has_latest_[1] = false;
   snapshot_ = ServoSnapshot{};
 }
 
+/// Everything measured is void; the clock keeps its command, and a first step stays spent.
 template <class Grid, std::size_t Window>
-SampleVerdict BasicAdaptiveServo<Grid, Window>::check_order(const TimestampPair& pair) noexcept {
-  const std::size_t side = index_of(pair.direction);
-  if (!has_latest_[side]) return SampleVerdict::kUsed;
-  const TimestampPair& previous = latest_[side];
-  const bool reference_newer = pair.reference > previous.reference;
-  const bool local_newer = pair.free_running > previous.free_running;
-  if (reference_newer && local_newer) return SampleVerdict::kUsed;
-  return reference_newer || local_newer ? SampleVerdict::kImplausible : SampleVerdict::kDuplicate;
+void BasicAdaptiveServo<Grid, Window>::forget() noexcept {
+  // In place: a temporary would be kilobytes on the stack.
+  std::construct_at(&estimator_, known_delay(config_));
+  meter_ = adaptive::IntervalMeter{static_cast<double>(config_.sync_interval.count())};
+  started_ = false;
 }
 
-/// Without a configured interval the unit of time is provisional until two messages of the same
-/// direction have been seen.
-template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::measure_interval(const TimestampPair& pair,
-                                                        bool had_previous) noexcept {
-  if (interval_known_ || !had_previous) return;
-  const std::size_t side = index_of(pair.direction);
-  const double measured = (pair.reference - latest_[side].reference).ns();
-  estimator_.rescale_time(measured / interval_ns_);
-  interval_ns_ = measured;
-  interval_known_ = true;
-}
-
+/// Time passes by the reference, whose stamps do not depend on the path; unless it has jumped
+/// against the free-running clock.
 template <class Grid, std::size_t Window>
 Observation BasicAdaptiveServo<Grid, Window>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
-  const ReferenceTime event = pair.reference + Duration::from_ns(sign * estimator_.estimate().d);
+  const double delay = std::clamp(estimator_.estimate().d, -kLongestDelayNs, kLongestDelayNs);
+  const ReferenceTime event = pair.reference + Duration::from_ns(sign * delay);
   Observation seen;
   seen.sign = sign;
   if (!started_) {
     base_ = raw;
     started_ = true;
   } else {
-    seen.elapsed = (event - event_).ns() / interval_ns_;
+    const double interval = meter_.interval_ns();
+    const double by_reference = (event - event_).ns();
+    const double by_oscillator = (pair.free_running - previous_).ns();
+    const bool jumped =
+        std::abs(by_reference - by_oscillator) > 0.5 * (std::abs(by_oscillator) + interval);
+    seen.elapsed = (jumped ? by_oscillator : by_reference) / interval;
   }
   seen.z = (raw - base_).ns();
   event_ = event;
+  previous_ = pair.free_running;
   return seen;
+}
+
+/// Keeps the offset states so small that a double resolves them to well below a nanosecond.
+template <class Grid, std::size_t Window>
+void BasicAdaptiveServo<Grid, Window>::rebase() noexcept {
+  const double x = estimator_.estimate().x;
+  if (std::abs(x) < kLargestOffsetNs) return;
+  const Duration shift = Duration::from_ns(x);
+  base_ += shift;
+  estimator_.shift_offset(-shift.ns());
 }
 
 template <class Grid, std::size_t Window>
@@ -112,13 +115,15 @@ bool BasicAdaptiveServo<Grid, Window>::ready() const noexcept {
 template <class Grid, std::size_t Window>
 ServoUpdate BasicAdaptiveServo<Grid, Window>::update(const TimestampPair& pair,
                                                      const ClockReading& now) noexcept {
-  const SampleVerdict order = check_order(pair);
-  if (order != SampleVerdict::kUsed) return {order, false, {}};
-  const std::size_t side = index_of(pair.direction);
-  measure_interval(pair, has_latest_[side]);
-  latest_[side] = pair;
-  has_latest_[side] = true;
+  using Order = adaptive::MessageOrder::Verdict;
+  const Order order = order_.judge(pair);
+  if (order == Order::kDuplicate) return {SampleVerdict::kDuplicate, false, {}};
+  if (order == Order::kImplausible) return {SampleVerdict::kImplausible, false, {}};
+  if (order == Order::kNewEpoch) forget();
+  const double longer = meter_.observe(pair);
+  if (longer != 1.0) estimator_.rescale_time(longer);
   const double credit = estimator_.update(pair.direction, observe(pair));
+  rebase();
   ServoUpdate result;
   if (ready()) result = steer(now);
   result.verdict = credit < 0.5 ? SampleVerdict::kRejected : SampleVerdict::kUsed;
@@ -130,15 +135,17 @@ ServoUpdate BasicAdaptiveServo<Grid, Window>::update(const TimestampPair& pair,
 template <class Grid, std::size_t Window>
 ServoUpdate BasicAdaptiveServo<Grid, Window>::steer(const ClockReading& now) noexcept {
   const Estimate& e = estimator_.estimate();
-  const double y = e.y / interval_ns_;
+  const double y = e.y / meter_.interval_ns();
   const double r = 1.0 + y;
+  // Before the rate is known, or on nonsense: no command is better than any.
+  if (!(std::abs(y) < kPlausibleDeviation)) return {};
   const Duration since_event = now.free_running.since_epoch() - event_.since_epoch() - base_;
   const double elapsed_free = since_event.ns() - e.x;  // F_now - F_e
   const ReferenceTime reference_now =
       event_ + since_event - Duration::from_ns(e.x + elapsed_free * (y / r));
   const double offset_ns = offset_from_reference(now.local, reference_now).ns();
   const adaptive::Steered steered =
-      steering_.steer({offset_ns, r}, kCorrectionShare * interval_ns_);
+      steering_.steer({offset_ns, r}, kCorrectionShare * meter_.interval_ns());
   snapshot_.state = steered.stepped ? ServoState::kJump : ServoState::kLocked;
   publish(offset_ns);
   return {SampleVerdict::kUsed, true, steered.command};
@@ -151,10 +158,10 @@ void BasicAdaptiveServo<Grid, Window>::publish(double offset_ns) noexcept {
   snapshot_.offset_known = true;
   snapshot_.offset = Duration::from_ns(offset_ns);
   snapshot_.path_delay = Duration::from_ns(e.d);
-  snapshot_.rate_ratio = Rate::from_ratio(1.0 / (1.0 + e.y / interval_ns_));
+  snapshot_.rate_ratio = Rate::from_ratio(1.0 / (1.0 + e.y / meter_.interval_ns()));
   snapshot_.offset_gain = estimator_.gain();
   snapshot_.offset_sigma_ns = s * std::sqrt(e.xx);
-  snapshot_.rate_sigma_ppb = s * std::sqrt(e.yy) / interval_ns_ * 1e9;
+  snapshot_.rate_sigma_ppb = s * std::sqrt(e.yy) / meter_.interval_ns() * 1e9;
   snapshot_.path_delay_sigma_ns = s * std::sqrt(e.dd);
   snapshot_.timestamp_noise_ns = s;
 }

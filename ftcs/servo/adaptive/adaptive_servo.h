@@ -5,6 +5,8 @@
 #include <optional>
 
 #include "ftcs/servo/adaptive/estimator.h"
+#include "ftcs/servo/adaptive/interval_meter.h"
+#include "ftcs/servo/adaptive/message_order.h"
 #include "ftcs/servo/adaptive/steering.h"
 #include "ftcs/servo/servo.h"
 #include "ftcs/servo/servo_config_error.h"
@@ -39,9 +41,9 @@ class BasicAdaptiveServo {
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
 
  private:
-  [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
+  void forget() noexcept;
+  void rebase() noexcept;
   [[nodiscard]] adaptive::Observation observe(const TimestampPair& pair) noexcept;
-  void measure_interval(const TimestampPair& pair, bool had_previous) noexcept;
   [[nodiscard]] bool ready() const noexcept;
   [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
   void publish(double offset_ns) noexcept;
@@ -49,13 +51,12 @@ class BasicAdaptiveServo {
   AdaptiveConfig config_;
   adaptive::Estimator<Grid, Window> estimator_;
   adaptive::Steering steering_;
-  double interval_ns_ = 0.0;
+  adaptive::IntervalMeter meter_;
+  adaptive::MessageOrder order_{};
   bool started_ = false;
-  bool interval_known_ = false;
-  Duration base_{};  ///< first z: keeps the states small
-  TimestampPair latest_[2] = {};
-  bool has_latest_[2] = {};
-  ReferenceTime event_{};  ///< of the last message, reference time at the local clock
+  Duration base_{};             ///< first z: keeps the states small
+  FreeRunningTime previous_{};  ///< of the last message
+  ReferenceTime event_{};       ///< of the last message, reference time at the local clock
   ServoSnapshot snapshot_{};
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace ftcs::adaptive {
 namespace {
@@ -31,7 +32,9 @@ constexpr double kRejected = 0.1;
 constexpr double kSmallestScale = 1e-4;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
-constexpr std::uint32_t kOpinionPeriod = 8;
+constexpr std::uint8_t kOpinionPeriod = 8;
+/// Rejections in a row, of one direction, after which it is asked every time for a while.
+constexpr std::uint8_t kSurprises = 3;
 
 std::size_t index_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 0 : 1;
@@ -43,6 +46,12 @@ double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
 template <class Grid, std::size_t Window>
 bool Estimator<Grid, Window>::observable() const noexcept {
   return two_way() || known_delay_.known() || count_ > kMixFrom;
+}
+
+template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::restart() noexcept {
+  const KnownDelay delay = known_delay_;
+  std::construct_at(this, delay);
 }
 
 template <class Grid, std::size_t Window>
@@ -92,16 +101,28 @@ void Estimator<Grid, Window>::rescale_time(double factor) noexcept {
 }
 
 template <class Grid, std::size_t Window>
+void Estimator<Grid, Window>::shift_offset(double shift_ns) noexcept {
+  bank_.for_each([shift_ns](Estimate& e) { e.x += shift_ns; });
+  mixed_.x += shift_ns;
+  second_opinion_.shift_offset(shift_ns);
+}
+
+template <class Grid, std::size_t Window>
 double Estimator<Grid, Window>::update(Direction direction, const Observation& seen) noexcept {
   const std::size_t side = index_of(direction);
+  const double elapsed = count_ == 0 ? 0.0 : seen.elapsed;
   if (count_ == 0) begin(direction);
   connect_second_direction(direction);
   ++count_;
   ++since_change_;
-  bank_.predict(seen.elapsed);
+  bank_.predict(elapsed);
   const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
   bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom, innovations_);
   bank_.correct(seen, scale_, innovations_);
+  if (!bank_.healthy()) {  // absurd input, or rounding after absurd input
+    restart();
+    return 0.0;
+  }
 
   const double credit = innovations_.credit[best_];
   const double innovation = innovations_.centred[best_] + scale_ * shape_[side].tail;
@@ -141,7 +162,10 @@ template <class Grid, std::size_t Window>
 void Estimator<Grid, Window>::seek_second_opinion(const Observation& seen,
                                                   double innovation) noexcept {
   second_opinion_.push(seen, innovation);
-  if (count_ > kOpinionOften && count_ % kOpinionPeriod != 0) return;
+  if (std::max(rejected_[0], rejected_[1]) >= kSurprises) surprise_ = 2 * kOpinionPeriod;
+  const bool due = count_ <= kOpinionOften || count_ % kOpinionPeriod == 0 || surprise_ > 0;
+  if (surprise_ > 0) --surprise_;
+  if (!due) return;
   const bool delay_free = two_way() && !known_delay_.known();
   const FreshFit fit = second_opinion_.consult(delay_free, known_delay_.mean_ns);
   if (fit.better) start_again(fit);
@@ -164,7 +188,9 @@ void Estimator<Grid, Window>::start_again(const FreshFit& fit) noexcept {
   rejected_ = {};
   residuals_.clear();
   forget_evidence();
+  second_opinion_.adopt(start);
   since_change_ = 0;
+  surprise_ = 0;
   count_ = kJudgeFrom;
 }
 

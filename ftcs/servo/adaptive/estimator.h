@@ -28,6 +28,7 @@ template <class Grid, std::size_t Window>
 class Estimator {
  public:
   explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
+  void restart() noexcept;
 
   /// Returns the probability that the message is no outlier.
   double update(Direction direction, const Observation& seen) noexcept;
@@ -43,6 +44,8 @@ class Estimator {
   [[nodiscard]] double gain() const noexcept { return gain_; }
   /// The unit of time becomes `factor` times as long.
   void rescale_time(double factor) noexcept;
+  /// Every offset, past ones included, grows by `shift_ns`.
+  void shift_offset(double shift_ns) noexcept;
 
  private:
   using Bank = ModelBank<Grid>;
@@ -83,6 +86,7 @@ class Estimator {
   std::size_t best_ = Grid::kStart;
   std::uint32_t count_ = 0;
   std::uint32_t since_change_ = 0;
+  std::uint8_t surprise_ = 0;  ///< messages for which the second opinion is still sought
   double scale_ = 100.0;
   double robust_scale_ = 100.0;
   double gain_ = 1.0;

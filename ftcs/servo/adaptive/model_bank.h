@@ -148,6 +148,17 @@ class ModelBank {
     yd_[i] = e.yd;
     dd_[i] = e.dd;
   }
+  /// Every state finite and every variance positive.
+  [[nodiscard]] bool healthy() const noexcept {
+    double sum = 0.0;
+    double least = 1.0;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      // Not finite times zero is not a number, which no comparison below survives.
+      sum += 0.0 * (x_[i] + y_[i] + d_[i] + xx_[i] + yy_[i] + dd_[i] + xy_[i] + xd_[i] + yd_[i]);
+      least = std::min(least, std::min(std::min(xx_[i], yy_[i]), dd_[i] + kDelayWalk));
+    }
+    return sum == 0.0 && least > 0.0;
+  }
   /// The same change to every model.
   template <class Change>
   void for_each(Change change) noexcept {

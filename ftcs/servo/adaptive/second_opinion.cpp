@@ -37,9 +37,19 @@ void SecondOpinion<Capacity>::rescale_time(double factor) noexcept {
 }
 
 template <std::size_t Capacity>
+void SecondOpinion<Capacity>::shift_offset(double shift_ns) noexcept {
+  for (Message& message : messages_) message.z += shift_ns;
+}
+
+template <std::size_t Capacity>
 double SecondOpinion<Capacity>::residual(const Message& message,
                                          const Estimate& line) const noexcept {
   return message.z - line.x - line.y * (message.time - time_) - message.sign * line.d;
+}
+
+template <std::size_t Capacity>
+void SecondOpinion<Capacity>::adopt(const Estimate& line) noexcept {
+  for (Message& message : messages_) message.innovation = residual(message, line);
 }
 
 /// Least squares of z on (1, t, sign), time relative to the newest message; covariance in units of

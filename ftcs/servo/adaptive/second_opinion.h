@@ -31,9 +31,12 @@ class SecondOpinion {
   void push(const Observation& seen, double innovation) noexcept;
   /// `delay_free`: estimate d too; otherwise the delay is `known_delay`.
   [[nodiscard]] FreshFit consult(bool delay_free, double known_delay) const noexcept;
+  /// The filters start again from `line`: what they had thought of these messages is void.
+  void adopt(const Estimate& line) noexcept;
   void clear() noexcept { *this = SecondOpinion{}; }
   /// The unit of time becomes `factor` times as long.
   void rescale_time(double factor) noexcept;
+  void shift_offset(double shift_ns) noexcept;
 
  private:
   struct Message {

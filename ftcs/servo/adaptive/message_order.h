@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/servo/servo.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs::adaptive {
+
+/// Decides whether a message is news: both clocks must have advanced since the last one of its
+/// direction. Late and repeated messages are refused, but not for ever: if refused messages
+/// themselves advance, a clock has been set back, and everything before is void.
+class MessageOrder {
+ public:
+  enum class Verdict : std::uint8_t { kNews, kDuplicate, kImplausible, kNewEpoch };
+
+  [[nodiscard]] Verdict judge(const TimestampPair& pair) noexcept {
+    Side& side = sides_[index_of(pair.direction)];
+    if (!side.seen || newer(pair, side.latest)) {
+      side = {pair, pair, true, 0};
+      return Verdict::kNews;
+    }
+    if (side.refused > 0 && newer(pair, side.candidate)) {
+      ++side.refused;
+      side.candidate = pair;
+    } else if (!same(pair, side.refused > 0 ? side.candidate : side.latest)) {
+      side.refused = 1;
+      side.candidate = pair;
+    }
+    if (side.refused >= kRefusals) {
+      sides_ = {};
+      side = {pair, pair, true, 0};
+      return Verdict::kNewEpoch;
+    }
+    const bool older =
+        pair.reference <= side.latest.reference && pair.free_running <= side.latest.free_running;
+    return older ? Verdict::kDuplicate : Verdict::kImplausible;
+  }
+  void reset() noexcept { sides_ = {}; }
+
+ private:
+  struct Side {
+    TimestampPair latest{};     ///< newest message taken
+    TimestampPair candidate{};  ///< newest message refused since
+    bool seen = false;
+    std::uint8_t refused = 0;
+  };
+  /// Two messages may overtake each other on the way; three in order are a new epoch.
+  static constexpr std::uint8_t kRefusals = 3;
+
+  [[nodiscard]] static std::size_t index_of(Direction direction) noexcept {
+    return direction == Direction::kForward ? 0 : 1;
+  }
+  [[nodiscard]] static bool newer(const TimestampPair& a, const TimestampPair& b) noexcept {
+    return a.reference > b.reference && a.free_running > b.free_running;
+  }
+  [[nodiscard]] static bool same(const TimestampPair& a, const TimestampPair& b) noexcept {
+    return a.reference == b.reference && a.free_running == b.free_running;
+  }
+
+  std::array<Side, 2> sides_{};
+};
+
+}  // namespace ftcs::adaptive
