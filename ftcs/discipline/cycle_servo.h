@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "ftcs/clock/cycle_timer.h"
+#include "ftcs/clock/steering_history.h"
+#include "ftcs/discipline/cycle_servo_types.h"
+
+namespace ftcs {
+
+/// Stands in for the adaptive servo where its code shall not be linked.
+struct NoAdaptiveServo {
+  explicit NoAdaptiveServo(const AdaptiveConfig&) noexcept {}
+  ServoUpdate update(const TimestampPair&, const ClockReading&) noexcept { return {}; }
+  void reset() noexcept {}
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return {}; }
+};
+
+/// Keeps a cyclic task in phase with a reference clock that only its own frames can read: Section V
+/// of the paper, eq. 25 (FTCS) and 26 (PICS) on a cycle timer, or the adaptive servo every cycle.
+///
+/// The steered clock is the count of cycles: it shows m * cycle + shift at the m-th trigger, so
+/// that its offset from the reference is E, early positive. Each frame is a backward pair: local =
+/// what the steered clock showed when it was sent, reference = latch minus transit. Hence the
+/// sender's lateness enters with its sign (E = -phase(t_ref - lateness)) and the tick of the timer
+/// with it.
+///
+/// k(n) is formed from unwrapped reference time: a phase alone, modulo the cycle, locks happily to
+/// a rate that is wrong by one cycle per interval. A value; nothing waits, nothing allocates.
+template <class Adaptive>
+class BasicCycleServo {
+ public:
+  explicit BasicCycleServo(const CycleServoConfig& config) noexcept;
+
+  /// The first trigger: one cycle from now.
+  [[nodiscard]] CycleDecision start(FreeRunningTime now) noexcept;
+  /// A cycle is over: what its frame told, at `now`. Returns the next trigger.
+  [[nodiscard]] CycleDecision update(const CycleSample& sample, FreeRunningTime now) noexcept;
+
+  [[nodiscard]] const CycleServoCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const CycleServoConfig& config() const noexcept { return config_; }
+  /// Reference time that the steered clock believes in at an instant of the host.
+  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept {
+    return history_.local_at(instant);
+  }
+  /// Number of the coming trigger on the grid of reference time.
+  [[nodiscard]] CycleTrigger next_trigger() const noexcept { return timer_.next(history_); }
+
+ private:
+  [[nodiscard]] CycleVerdict judge(const CycleSample& sample) const noexcept;
+  void count(CycleVerdict verdict) noexcept;
+  void anchor(const CycleSample& sample, FreeRunningTime stamp) noexcept;
+  void follow(const CycleSample& sample, FreeRunningTime stamp, FreeRunningTime now) noexcept;
+  [[nodiscard]] ServoUpdate ask_law(const CycleSample& sample, FreeRunningTime stamp,
+                                    const ClockReading& now) noexcept;
+  void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
+  void restart_law() noexcept;
+  [[nodiscard]] FreeRunningTime stamp_of(const CycleSample& sample) const noexcept;
+  [[nodiscard]] CycleDecision decide(FreeRunningTime now) noexcept;
+
+  CycleServoConfig config_;
+  FtcsServo ftcs_;
+  PicsServo pics_;
+  Adaptive adaptive_;
+  SteeringHistory history_;
+  CycleTimer timer_;
+  LockDetector lock_;
+  CycleTrigger trigger_{};  ///< of the cycle under way
+  CycleDecision decision_{};
+  CycleServoCounters counters_{};
+  bool anchored_ = false;
+  std::uint32_t until_sync_ = 0;    ///< cycles until FTCS or PICS takes its next sample
+  std::uint32_t coasting_ = 0;      ///< cycles without a usable sample
+  std::uint32_t out_of_phase_ = 0;  ///< consecutive samples further off than half a cycle
+};
+
+using CycleServo = BasicCycleServo<AdaptiveServo>;
+extern template class BasicCycleServo<AdaptiveServo>;
+
+}  // namespace ftcs

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: MIT
+// The world: a host whose clock is off by some ppm, wakes its task late by 20 to 120 us (known from
+// a stamp, 300 ns good), and a reference that a frame reaches 700 ns after it was sent. Cycle 1 ms.
+#include "ftcs/discipline/cycle_servo.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs {
+namespace {
+
+constexpr Nanoseconds kCycle{1'000'000};
+constexpr Nanoseconds kTransit{700};
+
+CycleServoConfig config_of(CycleLaw law) {
+  CycleServoConfig config;
+  config.law = law;
+  config.cycles_per_sync = 100;
+  config.transit = kTransit;
+  return config;
+}
+
+/// Host and reference around a servo. Deterministic; uniform numbers made by hand.
+struct World {
+  explicit World(const CycleServoConfig& config) : servo(config) {
+    decision = servo.start(FreeRunningTime::from_ns(3'141'592));
+  }
+  double uniform() {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) / 9007199254740992.0;
+  }
+  [[nodiscard]] ReferenceTime reference_at(FreeRunningTime t) const {
+    return ReferenceTime{Nanoseconds{start}} + scale(t - FreeRunningTime{}, Rate::from_ppm(ppm)) +
+           jump;
+  }
+  void set_ppm(double next) {
+    const Duration before = reference_at(decision.wake).since_epoch();
+    ppm = next;
+    jump += before - reference_at(decision.wake).since_epoch();
+  }
+  /// Error of the virtual trigger itself against the grid of reference time, ns; early is positive.
+  [[nodiscard]] double true_error() const {
+    const std::int64_t cycle = servo.config().cycle.count();
+    const std::int64_t at = reference_at(decision.virtual_instant).since_epoch().rounded_ns() -
+                            servo.config().shift.count();
+    const std::int64_t folded = ((at + cycle / 2) % cycle + cycle) % cycle - cycle / 2;
+    return static_cast<double>(-folded);
+  }
+  void cycle(bool lost = false) {
+    const Duration late = Duration::from_ns(20'000.0 + 100'000.0 * uniform()) + stall;
+    CycleSample sample;
+    sample.has_reference = !lost;
+    const FreeRunningTime really_sent = decision.wake + late;
+    sample.sent = really_sent + Duration::from_ns(stamp_noise * (uniform() - 0.5));
+    sample.reference = reference_at(really_sent) + Duration{kTransit};
+    sample.has_received = true;
+    sample.received = sample.sent + round_trip;
+    if (falsify_lateness) sample.sent = decision.wake - (sample.sent - decision.wake);
+    if (mirror_reference) {
+      const auto local = servo.local_at(sample.sent).since_epoch();
+      sample.reference = ReferenceTime{local + local - sample.reference.since_epoch()};
+    }
+    if (change) change(sample);
+    decision = servo.update(sample, really_sent + round_trip);
+    stall = {};
+  }
+  void run(int n) {
+    for (int i = 0; i < n; ++i) cycle();
+  }
+  /// RMS of the true error over n cycles.
+  double rms(int n) {
+    double sum = 0;
+    for (int i = 0; i < n; ++i) {
+      cycle();
+      sum += true_error() * true_error();
+    }
+    return std::sqrt(sum / n);
+  }
+
+  CycleServo servo;
+  CycleDecision decision;
+  double ppm = 50.0;
+  std::int64_t start = 777'000'123'456;
+  Duration jump{};
+  double stamp_noise = 600.0;  // ±300 ns
+  Duration stall{};
+  Duration round_trip{Nanoseconds{60'000}};
+  bool falsify_lateness = false;
+  bool mirror_reference = false;
+  void (*change)(CycleSample&) = nullptr;
+  std::uint64_t state = 42;
+};
+
+/// PICS has no rate of its own: what it runs at holds the correction of the phase too.
+double rate_tolerance_ppm(CycleLaw law) { return law == CycleLaw::kPics ? 15.0 : 5.0; }
+
+class EachLaw : public ::testing::TestWithParam<CycleLaw> {};
+INSTANTIATE_TEST_SUITE_P(Laws, EachLaw,
+                         ::testing::Values(CycleLaw::kFtcs, CycleLaw::kPics, CycleLaw::kAdaptive));
+
+TEST_P(EachLaw, locks_and_keeps_the_virtual_trigger_in_phase) {
+  World world(config_of(GetParam()));
+  world.run(600);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_NEAR(world.decision.rate.ppm(), 50.0, rate_tolerance_ppm(GetParam()));
+  EXPECT_LT(world.rms(2000), 500.0);
+}
+
+TEST_P(EachLaw, stands_on_the_same_phase_after_each_start) {
+  for (std::int64_t start = 0; start < 1'000'000; start += 173'000) {
+    CycleServoConfig config = config_of(GetParam());
+    config.shift = Nanoseconds{250'000};
+    World world(config);
+    world.start += start;
+    world.run(700);
+    EXPECT_NEAR(world.true_error(), 0.0, 2000.0) << "start " << start;
+  }
+}
+
+TEST_P(EachLaw, removes_any_phase_itself_when_it_may_not_jump) {
+  for (std::int64_t start = 0; start < 1'000'000; start += 173'000) {
+    CycleServoConfig config = config_of(GetParam());
+    config.align_at_start = false;
+    World world(config);
+    world.start += start;
+    FreeRunningTime before = world.decision.virtual_instant;
+    for (int i = 0; i < 700; ++i) {
+      world.cycle();
+      const double length = (world.decision.virtual_instant - before).ns();
+      before = world.decision.virtual_instant;
+      ASSERT_NEAR(length, 1e6, 1.02e4) << "a cycle bent by more than F";
+    }
+    EXPECT_EQ(world.decision.state, CycleState::kLocked);
+    EXPECT_NEAR(world.true_error(), 0.0, 2000.0) << "start " << start;
+  }
+}
+
+TEST_P(EachLaw, a_lateness_of_the_wrong_sign_ruins_it) {
+  World world(config_of(GetParam()));
+  world.falsify_lateness = true;
+  world.run(600);
+  EXPECT_GT(world.rms(1000), 20'000.0);
+}
+
+TEST_P(EachLaw, an_error_of_the_wrong_sign_diverges) {
+  CycleServoConfig config = config_of(GetParam());
+  config.align_at_start = false;
+  World world(config);
+  world.mirror_reference = true;
+  world.run(3000);
+  EXPECT_NE(world.decision.state, CycleState::kLocked);
+  EXPECT_GT(world.servo.counters().resyncs + world.servo.counters().impossible, 0U);
+}
+
+TEST_P(EachLaw, does_not_mind_five_percent_lost_frames) {
+  World world(config_of(GetParam()));
+  for (int i = 0; i < 3000; ++i) world.cycle(i % 20 == 3);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_EQ(world.servo.counters().lost, 150U);
+  EXPECT_LT(world.rms(1000), 500.0);
+}
+
+TEST_P(EachLaw, a_stall_is_gated_and_the_grid_is_kept) {
+  World world(config_of(GetParam()));
+  world.run(700);
+  for (int second = 0; second < 5; ++second) {
+    world.stall = Nanoseconds{5'000'000};
+    world.cycle();
+    EXPECT_EQ(world.decision.verdict, CycleVerdict::kLate);
+    EXPECT_EQ(world.decision.skipped, 5U);
+    EXPECT_EQ(world.decision.state, CycleState::kLocked);
+    for (int i = 0; i < 1000; ++i) {
+      world.cycle();
+      ASSERT_LT(std::abs(world.true_error()), 3000.0);
+    }
+  }
+}
+
+TEST_P(EachLaw, a_slow_frame_is_gated) {
+  World world(config_of(GetParam()));
+  world.run(700);
+  world.round_trip = Nanoseconds{400'000};
+  world.cycle();
+  EXPECT_EQ(world.decision.verdict, CycleVerdict::kSlow);
+}
+
+TEST_P(EachLaw, follows_a_step_of_the_rate_without_a_false_lock) {
+  World world(config_of(GetParam()));
+  world.run(1000);
+  world.set_ppm(150.0);
+  int unlocked_or_close = 0;
+  for (int i = 0; i < 1500; ++i) {
+    world.cycle();
+    // Whoever says it is locked must be within the band that it may leave.
+    const bool honest =
+        world.decision.state != CycleState::kLocked || std::abs(world.true_error()) < 21'000.0;
+    unlocked_or_close += honest ? 1 : 0;
+  }
+  EXPECT_EQ(unlocked_or_close, 1500);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_NEAR(world.decision.rate.ppm(), 150.0, rate_tolerance_ppm(GetParam()));
+}
+
+TEST_P(EachLaw, a_reference_that_starts_anew_is_found_again) {
+  World world(config_of(GetParam()));
+  world.run(700);
+  world.jump = -Nanoseconds{500'000'333'000};
+  world.run(2);
+  EXPECT_EQ(world.decision.verdict, CycleVerdict::kImpossible);
+  world.run(700);
+  EXPECT_EQ(world.servo.counters().resyncs, 1U);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_NEAR(world.true_error(), 0.0, 2000.0);
+}
+
+TEST_P(EachLaw, one_bad_latch_does_nothing) {
+  World world(config_of(GetParam()));
+  world.run(700);
+  world.change = [](CycleSample& sample) { sample.reference = ReferenceTime{}; };
+  world.cycle();
+  world.change = nullptr;
+  EXPECT_EQ(world.decision.verdict, CycleVerdict::kImpossible);
+  EXPECT_LT(world.rms(300), 600.0);
+  EXPECT_EQ(world.servo.counters().resyncs, 0U);
+}
+
+TEST_P(EachLaw, silence_is_coasted_and_then_said) {
+  World world(config_of(GetParam()));
+  world.run(2000);
+  for (int i = 0; i < 1999; ++i) world.cycle(true);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_LT(std::abs(world.true_error()), 20'000.0) << "the rate was kept for two seconds";
+  world.cycle(true);
+  EXPECT_EQ(world.decision.state, CycleState::kCoasting);
+  world.run(300);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+}
+
+TEST_P(EachLaw, a_coarse_timer_is_no_noise_when_its_rounding_is_known) {
+  CycleServoConfig config = config_of(GetParam());
+  config.resolution = Nanoseconds{10'000};
+  World world(config);
+  world.run(700);
+  double event = 0;
+  double virtual_error = 0;
+  for (int i = 0; i < 2000; ++i) {
+    world.cycle();
+    EXPECT_EQ(world.decision.wake.since_epoch().rounded_ns() % 10'000, 0);
+    const double rounding = (world.decision.wake - world.decision.virtual_instant).ns();
+    virtual_error += world.true_error() * world.true_error();
+    event += (world.true_error() - rounding) * (world.true_error() - rounding);
+  }
+  EXPECT_LT(std::sqrt(virtual_error / 2000), 500.0);
+  EXPECT_NEAR(std::sqrt(event / 2000), 10'000.0 / std::sqrt(12.0), 200.0);
+}
+
+TEST(CycleServo, the_adaptive_law_locks_within_fifty_cycles) {
+  CycleServoConfig config = config_of(CycleLaw::kAdaptive);
+  config.lock.dwell = 20;
+  World world(config);
+  int cycles = 0;
+  while (world.decision.state != CycleState::kLocked && cycles < 1000) {
+    world.cycle();
+    ++cycles;
+  }
+  EXPECT_LE(cycles, 50);
+}
+
+TEST(CycleServo, ftcs_locks_within_three_sync_intervals) {
+  World world(config_of(CycleLaw::kFtcs));
+  int last_bad = 0;
+  for (int i = 0; i < 1000; ++i) {
+    world.cycle();
+    if (std::abs(world.true_error()) > 5000.0) last_bad = i;
+  }
+  EXPECT_LE(last_bad, 3 * 100);
+}
+
+TEST(CycleServo, the_rate_comes_from_whole_reference_time_so_that_no_cycle_slips) {
+  // A host 5 % off per cycle in phase terms would alias if k(n) came from the phase alone: with 20
+  // cycles per interval a slip of one cycle looks like no error at all.
+  CycleServoConfig config = config_of(CycleLaw::kFtcs);
+  config.cycles_per_sync = 20;
+  World world(config);
+  world.run(500);
+  const ReferenceTime before = world.reference_at(world.decision.virtual_instant);
+  world.run(1000);
+  const Duration elapsed = world.reference_at(world.decision.virtual_instant) - before;
+  EXPECT_NEAR(elapsed.ns(), 1000.0 * static_cast<double>(kCycle.count()), 20'000.0);
+}
+
+TEST(CycleServo, touches_no_heap) {
+  World world(config_of(CycleLaw::kAdaptive));
+  const test::ForbidAllocation guard;
+  world.run(100);
+}
+
+}  // namespace
+}  // namespace ftcs
