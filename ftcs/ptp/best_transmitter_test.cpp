@@ -115,13 +115,17 @@ TEST_F(Table, a_full_table_keeps_whom_it_knows_and_gives_away_the_place_of_the_s
   for (std::uint8_t last = 2; last <= ForeignTransmitters::kCapacity; ++last) {
     EXPECT_EQ(hear(transmitter(last), 4s), ForeignTransmitters::Heard::kKnown);
   }
+  EXPECT_EQ(hear(transmitter(99), 4s), ForeignTransmitters::Heard::kTableFull) << "not yet silent";
   EXPECT_EQ(hear(transmitter(99), 5s), ForeignTransmitters::Heard::kNew) << "1 is silent since 0 s";
   EXPECT_EQ(hear(transmitter(1), 5s), ForeignTransmitters::Heard::kTableFull);
 }
 
 TEST_F(Table, silence_is_counted_in_the_transmitters_own_intervals) {
   table_.hear(transmitter(1), Duration{250ms}, at(10s));
+  table_.hear(transmitter(2), Duration{4s}, at(11s));
   EXPECT_EQ(table_.receipt_timeout(port(1), 3), at(10s + 750ms));
+  EXPECT_EQ(table_.receipt_timeout(port(2), 3), at(23s));
+  EXPECT_FALSE(table_.receipt_timeout(port(3), 3).has_value());
 }
 
 }  // namespace

@@ -200,10 +200,14 @@ class World {
   void check(const EventPair& pair) {
     if (pair.direction == Direction::kForward) {
       ++forward_pairs_;
+      ASSERT_GT(pair.reference, last_origin_) << "forward pairs in order";
+      last_origin_ = pair.reference;
       ASSERT_TRUE(sync_book_.contains({pair.reference, pair.free_running}))
           << "a wrong forward pair";
     } else {
       ++backward_pairs_;
+      ASSERT_GT(pair.free_running, last_request_) << "backward pairs in order";
+      last_request_ = pair.free_running;
       ASSERT_TRUE(request_book_.contains({pair.free_running, pair.reference}))
           << "a wrong backward pair";
     }
@@ -224,6 +228,8 @@ class World {
   Nanoseconds transmitter_timer_{-1};
   std::set<std::pair<ReferenceTime, FreeRunningTime>> sync_book_;
   std::set<std::pair<FreeRunningTime, ReferenceTime>> request_book_;
+  ReferenceTime last_origin_;
+  FreeRunningTime last_request_;
   std::size_t forward_pairs_ = 0;
   std::size_t backward_pairs_ = 0;
 };

@@ -28,6 +28,15 @@ TEST_F(Receiver, lost_follow_up_is_counted_and_harms_nothing) {
   EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
 }
 
+TEST_F(Receiver, follow_up_of_a_forgotten_sync_is_stale) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 1), 1s));
+  EXPECT_TRUE(general(follow_up(1, 1s), 2s + 1ns).empty());
+  EXPECT_EQ(count(Counter::kLostFollowUp), 1U);
+  EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(2, 3s)).size(), 1U);
+}
+
 TEST_F(Receiver, lost_sync_is_counted_and_its_follow_up_forgotten) {
   select_a();
   static_cast<void>(exchange(1, 1s));
@@ -59,6 +68,29 @@ TEST_F(Receiver, syncs_older_than_the_newest_are_dropped) {
   EXPECT_TRUE(of<EmitPair>(general(follow_up(4, 875ms), 1s + 1ms)).empty());
   EXPECT_EQ(count(Counter::kStaleSync), 1U);
   EXPECT_EQ(count(Counter::kStaleFollowUp), 1U);
+}
+
+TEST_F(Receiver, a_stale_one_step_sync_is_dropped_as_well) {
+  select_a();
+  static_cast<void>(exchange(5, 1s));
+  EXPECT_TRUE(of<EmitPair>(event(message_from(kA, 4, Sync{reference(875ms)}), 1s + 1ms)).empty());
+  EXPECT_EQ(count(Counter::kStaleSync), 1U);
+  EXPECT_EQ(count(Counter::kStaleFollowUp), 0U);
+}
+
+TEST_F(Receiver, sixteen_ids_separate_disorder_from_a_restart) {
+  select_a();
+  static_cast<void>(exchange(100, 1s));
+  EXPECT_TRUE(of<EmitPair>(exchange(85, 1125ms)).empty()) << "15 back: disorder";
+  EXPECT_EQ(count(Counter::kStaleSync), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(84, 1250ms)).size(), 1U) << "16 back: a restart";
+  EXPECT_EQ(count(Counter::kSequenceRestarts), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(100, 1375ms)).size(), 1U) << "16 ahead: loss";
+  EXPECT_EQ(count(Counter::kMissedSync), 15U);
+  EXPECT_EQ(count(Counter::kSequenceRestarts), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(117, 1500ms)).size(), 1U) << "17 ahead: a restart";
+  EXPECT_EQ(count(Counter::kMissedSync), 15U);
+  EXPECT_EQ(count(Counter::kSequenceRestarts), 2U);
 }
 
 TEST_F(Receiver, pairs_never_go_back_in_sequence) {

@@ -42,6 +42,14 @@ TEST_F(Receiver, a_servo_that_stayed_locked_is_believed_when_the_same_transmitte
   EXPECT_EQ(receiver_.state(), PortState::kTimeReceiver);
 }
 
+TEST_F(Receiver, a_servo_that_lost_lock_is_not_believed) {
+  select_a();
+  static_cast<void>(receiver_.on_servo_locked(local(1s)));
+  static_cast<void>(receiver_.on_servo_unlocked(local(1s)));
+  static_cast<void>(exchange(1, 2s));
+  EXPECT_EQ(receiver_.state(), PortState::kUncalibrated);
+}
+
 TEST_F(Receiver, a_lock_to_one_reference_says_nothing_about_another) {
   select_a();
   static_cast<void>(receiver_.on_servo_locked(local(1s)));

@@ -147,6 +147,7 @@ TEST_F(Receiver, honours_the_delay_request_interval_that_the_transmitter_demands
   Message response = delay_resp(id, 1s);
   response.header.log_interval = 3;
   static_cast<void>(general(response, 1s));
+  EXPECT_GT(*receiver_.deadline(), local(1s));
   Message announce = announce_from(kA);
   announce.header.log_interval = 7;  // no timeout in between
   auto now = local(1s);
@@ -222,6 +223,7 @@ TEST_F(Receiver, while_the_link_is_down_nothing_is_heard_and_nothing_is_due) {
   static_cast<void>(receiver_.on_link_down(local(400ms)));
   EXPECT_EQ(receiver_.state(), PortState::kFaulty);
   EXPECT_EQ(count(Counter::kLinkDown), 1U);
+  EXPECT_EQ(receiver_.transmitter(), nullptr);
   EXPECT_FALSE(receiver_.deadline().has_value());
   EXPECT_TRUE(general(announce_from(kA), 500ms).empty());
   EXPECT_TRUE(receiver_.on_timer(local(5s)).empty());
