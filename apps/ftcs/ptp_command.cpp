@@ -32,6 +32,7 @@ struct PtpArguments {
   std::optional<double> offset_gain;
   std::string converged_band;
   std::optional<std::uint32_t> converged_dwell;
+  std::string correction_time;
   std::string max_frequency;
   std::string clock = "virtual";
   std::string offset;
@@ -68,6 +69,11 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   }
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
   if (arguments.offset_gain) servo.ftcs.offset_gain = *arguments.offset_gain;
+  Duration correction_time{servo.ftcs.correction_time};
+  if (auto wrong = set_duration(arguments.correction_time, "--correction-time", correction_time)) {
+    return wrong;
+  }
+  servo.ftcs.correction_time = Nanoseconds{correction_time.rounded_ns()};
   if (arguments.converged_dwell) servo.ftcs.converged_dwell = *arguments.converged_dwell;
   if (!arguments.converged_band.empty()) {
     const auto band = parse_band(arguments.converged_band);
@@ -210,6 +216,8 @@ void add_own_flags(CLI::App& command, PtpArguments& arguments) {
                      "ftcs: B, as ENTER[:LEAVE], for example 1us:5us");
   command.add_option("--converged-dwell", arguments.converged_dwell,
                      "ftcs: samples inside the band before p applies");
+  command.add_option("--correction-time", arguments.correction_time,
+                     "ftcs: T_c, in which an offset is removed; default: the Sync interval");
   command.add_option("--max-frequency", arguments.max_frequency,
                      "largest adjustment, for example 500ppm");
   command.add_option("--clock", arguments.clock, "virtual (the only one)");
