@@ -148,9 +148,7 @@ ServoCommand ClockDiscipline::with_step(ServoCommand command, Duration offset) c
 
 ServoCommand ClockDiscipline::within_limits(ServoCommand command) const noexcept {
   command.tracking_rate = limits_.clamp(command.tracking_rate);
-  command.correction_rate = command.correction_time > Duration{}
-                                ? limits_.clamp(command.correction_rate)
-                                : command.tracking_rate;
+  command.correction_rate = limits_.clamp(command.correction_rate);
   return command;
 }
 

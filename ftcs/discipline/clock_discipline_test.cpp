@@ -152,6 +152,19 @@ TEST_F(ClockDisciplineTest, missing_samples_mean_holdover_at_the_tracking_rate) 
   EXPECT_EQ(sync().servo.state, ServoState::kLocked);
 }
 
+TEST_F(ClockDisciplineTest, messages_that_do_not_steer_do_not_prevent_holdover) {
+  start(Duration{}, config_for(ServoKind::kFtcs));
+  for (int n = 0; n < 20; ++n) sync_and_wait();
+  const EventPair old = forward();
+  discipline_->on_pair(old);
+  for (int n = 0; n < 5; ++n) {
+    advance(kInterval);
+    discipline_->on_pair(old);
+    discipline_->on_pair({Direction::kBackward, reference(), oscillator_.now()});
+  }
+  EXPECT_EQ(discipline_->latest().servo.state, ServoState::kHoldover);
+}
+
 TEST_F(ClockDisciplineTest, no_holdover_before_the_first_sample) {
   start(Duration{}, config_for(ServoKind::kFtcs));
   advance(Nanoseconds{60s});
@@ -185,10 +198,15 @@ TEST_F(ClockDisciplineTest, a_new_reference_starts_the_servo_again_and_keeps_the
   EXPECT_EQ(discipline_->latest().servo.state, ServoState::kUnlocked);
   EXPECT_FALSE(discipline_->latest().servo.offset_known);
   EXPECT_NEAR(discipline_->latest().tracking_rate.ppm(), 40.0, 1e-6);
+  advance(Nanoseconds{60s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kUnlocked);
   reference_jump_ = Nanoseconds{-5s};  // the other transmitter lives elsewhere
   EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kUsed);
   EXPECT_EQ(discipline_->counters().new_references, 1U);
   EXPECT_EQ(discipline_->counters().implausible, 0U);
+  reference_jump_ = Nanoseconds{-9s};  // the same one, with its time set
+  EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kImplausible);
+  EXPECT_EQ(discipline_->counters().implausible, 1U);
 }
 
 TEST_F(ClockDisciplineTest, never_steps_unless_the_policy_permits_it) {
@@ -243,17 +261,16 @@ TEST_F(ClockDisciplineTest, steps_whenever_the_policy_says_always) {
 
 TEST_F(ClockDisciplineTest, a_step_does_not_kick_the_incremental_pi) {
   DisciplineConfig config = config_for(ServoKind::kPics);
-  config.step = {StepMode::kFirst, 20us};
-  config.servo.limits = RateLimits::symmetric_ppb(1e6);
-  start(Nanoseconds{10ms}, config);
-  EXPECT_EQ(sync_and_wait().step, Duration{Nanoseconds{-10ms}});
-  EXPECT_NEAR(offset_ns(), -125'000.0, 1.0);  // the first command stands at its limit of -1000 ppm
-  // e(1) - e(0) is 125 us, with e(0) = 0 after the step; unshifted it would be 10 ms and stay at
-  // the limit.
-  EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), 1000.0, 1e-6);
+  config.step = {StepMode::kFirst, 5us};
+  start(Nanoseconds{10us}, config);
+  const Telemetry stepped = sync_and_wait();
+  EXPECT_EQ(stepped.step, Duration{Nanoseconds{-10us}});
+  EXPECT_NEAR(stepped.applied_rate.ppm(), -80.0, 1e-6);  // K_i e / T, which the step made needless
+  // Now 10 us behind: e - e(-1) is 10 us, because e(-1) became zero by the step; unshifted it would
+  // be 20 us.
+  EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), -80.0 + 80.0 + 80.0, 1e-6);
   sync_and_wait();
-  sync_and_wait();
-  EXPECT_NEAR(offset_ns(), 0.0, 1.0);
+  EXPECT_NEAR(offset_ns(), 0.0, 1e-3);
 }
 
 TEST_F(ClockDisciplineTest, refuses_an_absurd_first_offset) {
@@ -287,6 +304,7 @@ TEST_F(ClockDisciplineTest, no_rate_beyond_either_limit_reaches_the_clock) {
   start(Nanoseconds{100ms}, config);
   sync_and_wait();
   EXPECT_NEAR(sync_and_wait().applied_rate.ppm(), -1000.0, 1e-6);
+  EXPECT_EQ(discipline_->counters().clamps, 1U);
 }
 
 TEST_F(ClockDisciplineTest, a_refused_command_is_reported_and_the_next_one_repairs_it) {
@@ -324,6 +342,7 @@ TEST_F(ClockDisciplineTest, counts_what_became_of_every_message) {
   EXPECT_EQ(counters.backward, 1U);
   EXPECT_EQ(counters.implausible, 0U);
   EXPECT_EQ(counters.commands, 20U);
+  EXPECT_EQ(counters.clamps, 0U);
 }
 
 TEST_F(ClockDisciplineTest, the_free_running_servo_reports_and_leaves_the_clock_alone) {

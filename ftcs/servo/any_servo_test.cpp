@@ -97,6 +97,26 @@ TEST(AnyServo, common_interval_and_limits_reach_the_chosen_law) {
   EXPECT_EQ(feed(5, 0).correction_time, Duration{1s});
 }
 
+TEST(AnyServo, common_settings_reach_every_kind) {
+  for (const ServoKindName& entry : kServoKinds) {
+    ServoConfig config = config_for(entry.kind);
+    config.two_way.fixed_path_delay = 10us;
+    AnyServo servo = make_servo(config);
+    AffinePlant plant{1.0L, Duration{}};
+    for (int n = 0; n < 4; ++n) {  // no backward message ever
+      const TimestampPair sync{Direction::kForward, plant.reference() - Nanoseconds{10us},
+                               plant.local(), plant.free_running()};
+      (void)servo.update(sync, plant.read());
+      plant.advance_reference(Nanoseconds{125ms});
+    }
+    EXPECT_TRUE(servo.snapshot().offset_known) << entry.name;
+    EXPECT_NEAR(servo.snapshot().path_delay.ns(), 10'000.0, 1e-6) << entry.name;
+    config.sync_interval = -1ns;
+    if (entry.kind == ServoKind::kFreeRunning) continue;  // has no use for an interval
+    EXPECT_EQ(validate(config), ServoConfigError::kSyncInterval) << entry.name;
+  }
+}
+
 TEST(AnyServo, a_step_reaches_the_law_that_needs_to_know) {
   ServoConfig config = config_for(ServoKind::kPics);
   config.two_way.fixed_path_delay = 0ns;

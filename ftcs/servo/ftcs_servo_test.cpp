@@ -407,6 +407,10 @@ TEST(FtcsConfig, names_what_is_wrong) {
               c.converged_band = {Nanoseconds{-1}, Nanoseconds{1}};
             }),
             ServoConfigError::kConvergedBand);
+  EXPECT_EQ(error_of([](FtcsConfig& c) {
+              c.converged_band = {Nanoseconds{0}, Nanoseconds{0}};
+            }),
+            std::nullopt);
   EXPECT_EQ(error_of([](FtcsConfig& c) { c.limits.slowest = Rate::from_ratio(0.0); }),
             ServoConfigError::kRateLimits);
   EXPECT_EQ(error_of([](FtcsConfig& c) { c.plausible_ratio.fastest = Rate::from_ratio(0.9); }),

@@ -85,9 +85,9 @@ TEST(LinuxptpPiGains, may_be_given_as_constants_or_scales) {
   scaled.integral_scale = 0.2;
   scaled.proportional_exponent = -1.0;
   scaled.integral_exponent = 1.0;
-  scaled.proportional_norm_max = 0.3;
+  scaled.proportional_norm_max = 0.5;
   scaled.integral_norm_max = 10.0;
-  EXPECT_NEAR(linuxptp_gains(scaled, 2.0).proportional, 0.15, 1e-15);  // 0.3 / 2 < 0.4 / 2
+  EXPECT_NEAR(linuxptp_gains(scaled, 2.0).proportional, 0.2, 1e-15);
   EXPECT_NEAR(linuxptp_gains(scaled, 2.0).integral, 0.4, 1e-15);
 }
 
@@ -129,6 +129,10 @@ TEST(LinuxptpPiServo, steps_only_above_the_first_threshold_and_only_once) {
 TEST(LinuxptpPiServo, starts_again_and_steps_beyond_the_step_threshold) {
   LinuxptpPiConfig config = hardware(1s);
   config.step_threshold = 1ms;
+  config.first_step_threshold = 0ns;
+  LinuxptpPiServo at_threshold{config};
+  (void)at_threshold.update(sample_at(0, 1'000'000), {});
+  EXPECT_EQ(at_threshold.update(sample_at(1, 1'000'000), {}).command.step, Duration{});
   LinuxptpPiServo servo{config};
   (void)servo.update(sample_at(0, 0), {});
   EXPECT_TRUE(servo.update(sample_at(1, 0), {}).has_command);
@@ -200,6 +204,7 @@ TEST(LinuxptpPiServo, the_narrower_of_limits_and_max_frequency_holds) {
 
 TEST(LinuxptpPiServo, measures_the_interval_at_the_start_when_none_is_configured) {
   LinuxptpPiServo servo{};
+  EXPECT_EQ(servo.gains().proportional, 0.0);  // not known yet
   (void)servo.update(sample_at(0, 0), {});
   (void)servo.update(sample_at(0.125, 0), {});
   EXPECT_NEAR(servo.gains().proportional, 1.306246, 1e-6);
@@ -207,13 +212,27 @@ TEST(LinuxptpPiServo, measures_the_interval_at_the_start_when_none_is_configured
   EXPECT_NEAR(servo.gains().proportional, 1.306246, 1e-6);
 }
 
+TEST(LinuxptpPiServo, keeps_to_the_configured_interval_whatever_the_samples_say) {
+  LinuxptpPiServo servo{hardware(1s)};
+  (void)servo.update(sample_at(0, 0), {});
+  (void)servo.update(sample_at(0.125, 0), {});
+  EXPECT_NEAR(servo.gains().proportional, 0.7, 1e-12);
+}
+
 TEST(LinuxptpPiServo, ignores_repetitions_and_survives_a_reference_that_goes_backward) {
   LinuxptpPiServo servo{hardware(1s)};
   (void)servo.update(sample_at(5, 0), {});
-  EXPECT_EQ(servo.update(sample_at(5, 0), {}).verdict, SampleVerdict::kDuplicate);
+  const ServoUpdate repeated = servo.update(sample_at(5, 0), {});
+  EXPECT_EQ(repeated.verdict, SampleVerdict::kDuplicate);
+  EXPECT_FALSE(repeated.has_command);
+  SyncSample still = sample_at(5.5, 0);
+  still.origin = ReferenceTime::from_ns(5'000'000'000);
+  EXPECT_EQ(servo.update(still, {}).verdict, SampleVerdict::kImplausible);
   SyncSample back = sample_at(6, 0);
   back.origin = ReferenceTime::from_ns(1'000'000'000);
-  EXPECT_EQ(servo.update(back, {}).verdict, SampleVerdict::kImplausible);
+  const ServoUpdate backward = servo.update(back, {});
+  EXPECT_EQ(backward.verdict, SampleVerdict::kImplausible);
+  EXPECT_FALSE(backward.has_command);
   SyncSample next = sample_at(7, 0);
   next.origin = ReferenceTime::from_ns(2'000'000'000);
   EXPECT_TRUE(servo.update(next, {}).has_command);
@@ -249,6 +268,7 @@ TEST(LinuxptpPiConfig, names_what_is_wrong) {
             ServoConfigError::kProportionalGain);
   EXPECT_EQ(error_of([](Config& c) { c.integral_exponent = kNan; }),
             ServoConfigError::kIntegralGain);
+  EXPECT_EQ(error_of([](Config& c) { c.first_step_threshold = 0ns; }), std::nullopt);
   EXPECT_EQ(error_of([](Config& c) { c.first_step_threshold = -1ns; }),
             ServoConfigError::kStepThreshold);
   EXPECT_EQ(error_of([](Config& c) { c.step_threshold = -1ns; }), ServoConfigError::kStepThreshold);
