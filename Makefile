@@ -3,7 +3,7 @@
 # make test       install what is missing, build, test (at most 5 minutes after the build)
 # make test-all   everything, long runs too
 # make bench      nanoseconds and instructions per update, allocations
-# make check      formatting, linting, headers
+# make check      formatting, spelling, layers; make check-tidy: clang-tidy too
 # make fuzz       each fuzz target for FUZZ_SECONDS
 # make mutate     flip signs and comparisons one at a time; every mutant must fail a test
 
@@ -12,7 +12,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 DEMO_FLAGS ?=
 FUZZ_SECONDS ?= 60
 
-.PHONY: all configure build demo test test-all bench check tidy fuzz mutate deps deps-test clean
+.PHONY: all configure build demo test test-all bench check check-tidy fuzz mutate deps deps-test clean
 
 all: build
 
@@ -46,6 +46,9 @@ bench: deps-test
 
 check: deps-test configure
 	@tools/check
+
+check-tidy: deps-test
+	@tools/check tidy
 
 fuzz: deps-test
 	@FUZZ_SECONDS=$(FUZZ_SECONDS) test/fuzz/run.sh
