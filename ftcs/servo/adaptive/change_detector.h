@@ -21,17 +21,27 @@ class ChangeDetector {
   static constexpr std::size_t kNone = kSize;
 
   void add(const std::array<double, kSize>& log_density) noexcept {
-    std::array<float, kSize> l{};
-    for (std::size_t j = 0; j < kSize; ++j) l[j] = static_cast<float>(log_density[j]);
+    std::array<float, kWidth> l{};
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
+    }
     for (std::size_t i = 0; i < kCalm; ++i) {
-      for (std::size_t j = 0; j < kSize; ++j) {
-        sums_[i][j] = std::max(0.0F, sums_[i][j] + (l[j] - l[i]));
+      const float own = l[i];
+      std::array<float, kLanes> peak{};  // lanes, so that the compiler may use vectors
+      for (std::size_t j = (i + 1) / kLanes * kLanes; j < kWidth; j += kLanes) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+          const float sum = std::max(0.0F, sums_[i][j + lane] + (l[j + lane] - own));
+          sums_[i][j + lane] = sum;
+          peak[lane] = std::max(peak[lane], sum);
+        }
       }
+      peaks_[i] = std::max(std::max(peak[0], peak[1]), std::max(peak[2], peak[3]));
     }
   }
 
   /// The model that overtakes calm model i after `count` messages, or kNone. Clears its sums.
   [[nodiscard]] std::size_t take_over(std::size_t i, double count) noexcept {
+    if (peaks_[i] <= static_cast<float>(kThreshold)) return kNone;
     // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
     const auto calm_threshold = static_cast<float>(kThreshold * (1.0 + 16.0 / count));
     std::size_t winner = kNone;
@@ -60,7 +70,12 @@ class ChangeDetector {
   /// Jumps and the wildest frequency model explain anything: Occam's factor against them, nats.
   static constexpr float kHandicap = 4.0F;
 
-  std::array<std::array<float, kSize>, kCalm> sums_{};
+  static constexpr std::size_t kLanes = 4;
+  static constexpr std::size_t kWidth = (kSize + kLanes - 1) / kLanes * kLanes;
+  static constexpr float kNever = -1e30F;
+
+  std::array<std::array<float, kWidth>, kCalm> sums_{};
+  std::array<float, kCalm> peaks_{};  ///< largest of each row (up to three calmer models included)
 };
 
 }  // namespace ftcs::adaptive

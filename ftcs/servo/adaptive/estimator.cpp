@@ -30,6 +30,9 @@ constexpr std::uint32_t kYoung = 100;
 constexpr std::uint8_t kRejectedInARow = 10;
 constexpr double kRejected = 0.1;
 constexpr double kSmallestScale = 1e-4;
+constexpr double kSmallestSquare = 1e-30;
+/// Nats; a weight of e^-40 moves nothing.
+constexpr double kHopeless = 40.0;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 8;
@@ -117,16 +120,17 @@ double Estimator<Grid, Window>::update(Direction direction, const Observation& s
   ++since_change_;
   bank_.predict(elapsed);
   const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
-  bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom, innovations_);
-  bank_.correct(seen, scale_, innovations_);
+  bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
+  bank_.correct(seen, scale_);
   if (!bank_.healthy()) {  // absurd input, or rounding after absurd input
     restart();
     return 0.0;
   }
 
-  const double credit = innovations_.credit[best_];
-  const double innovation = innovations_.centred[best_] + scale_ * shape_[side].tail;
-  const double predicted = innovations_.predicted[best_];
+  const typename Bank::Innovations& innovations = bank_.innovations();
+  const double credit = innovations.credit[best_];
+  const double innovation = innovations.centred[best_] + scale_ * shape_[side].tail;
+  const double predicted = innovations.predicted[best_];
   gain_ = credit * predicted / (predicted + shape_[side].total_variance());
   if (count_ > kEvidenceFrom && observable()) gather_evidence();
   if (count_ > kJudgeFrom) {
@@ -138,8 +142,8 @@ double Estimator<Grid, Window>::update(Direction direction, const Observation& s
   rejected_[side] = credit < kRejected ? static_cast<std::uint8_t>(rejected_[side] + 1) : 0;
   if (rejected_[side] >= kRejectedInARow) leave_gate(side, innovation);
   if (weight_sum_ > 0.0 || count_ > kEvidenceFrom) {
-    const double variance = innovations_.variance[best_] / (scale_ * scale_);
-    residuals_.push(std::abs(innovations_.centred[best_]) / std::sqrt(variance));
+    const double variance = innovations.variance[best_] / (scale_ * scale_);
+    residuals_.push(std::abs(innovations.centred[best_]) / std::sqrt(variance));
     follow_scale();
   }
   if (count_ > kLearnFrom) {
@@ -196,15 +200,17 @@ void Estimator<Grid, Window>::start_again(const FreshFit& fit) noexcept {
 
 template <class Grid, std::size_t Window>
 void Estimator<Grid, Window>::gather_evidence() noexcept {
+  const typename Bank::Innovations& innovations = bank_.innovations();
   const double s2 = scale_ * scale_;
+  const double log_s2 = quick_log(s2);
   for (std::size_t i = 0; i < kSize; ++i) {
-    const double variance = innovations_.variance[i];
-    const double centred = innovations_.centred[i];
-    const double credit = innovations_.credit[i];
+    const double variance = innovations.variance[i];
+    const double centred = innovations.centred[i];
+    const double credit = innovations.credit[i];
     squares_[i] += credit * std::min(centred * centred / variance, kEvidenceLimit) * s2;
-    logs_[i] += credit * std::log(variance / s2);
+    logs_[i] += credit * (innovations.log_variance[i] - log_s2);
   }
-  weight_sum_ += innovations_.credit[best_];
+  weight_sum_ += innovations.credit[best_];
 }
 
 template <class Grid, std::size_t Window>
@@ -216,7 +222,7 @@ void Estimator<Grid, Window>::forget_evidence() noexcept {
 
 template <class Grid, std::size_t Window>
 void Estimator<Grid, Window>::detect_changes() noexcept {
-  detector_.add(innovations_.log_density);
+  detector_.add(bank_.innovations().log_density);
   std::array<std::size_t, kCalm> source{};
   bool any = false;
   for (std::size_t i = 0; i < kCalm; ++i) {
@@ -260,13 +266,16 @@ void Estimator<Grid, Window>::choose() noexcept {
     return;
   }
   typename Bank::Row cost{};
+  const double per_message = 1.0 / weight_sum_;
   for (std::size_t i = 0; i < kSize; ++i) {
-    cost[i] = weight_sum_ * std::log(std::max(squares_[i] / weight_sum_, 1e-300)) + logs_[i];
+    cost[i] =
+        weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) + logs_[i];
   }
   best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
   double total = 0.0;
   for (std::size_t i = 0; i < kSize; ++i) {
-    weight_[i] = std::exp(-0.5 * (cost[i] - cost[best_]));
+    const double behind = 0.5 * (cost[i] - cost[best_]);
+    weight_[i] = behind < kHopeless ? std::exp(-behind) : 0.0;
     total += weight_[i];
   }
   for (double& weight : weight_) weight /= total;

@@ -69,7 +69,6 @@ class Estimator {
 
   KnownDelay known_delay_{};
   Bank bank_{};
-  typename Bank::Innovations innovations_{};
   ChangeDetector<Grid> detector_{};
   std::array<NoiseLearner<Window>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};

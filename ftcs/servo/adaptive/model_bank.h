@@ -8,6 +8,7 @@
 
 #include "ftcs/servo/adaptive/delay_shape.h"
 #include "ftcs/servo/adaptive/noise_model.h"
+#include "ftcs/servo/adaptive/quick_log.h"
 
 namespace ftcs::adaptive {
 
@@ -52,7 +53,8 @@ class ModelBank {
     Row variance;     ///< its predicted variance, ns^2
     Row predicted;    ///< h P h', units of s^2
     Row log_density;  ///< outliers included
-    Row credit;       ///< probability that the packet is no outlier
+    Row log_variance;
+    Row credit;  ///< probability that the packet is no outlier
     Row slope;
     Row curvature;
   };
@@ -84,44 +86,43 @@ class ModelBank {
     }
   }
 
+  /// Judges one observation; without `gate` nothing is taken for an outlier.
   void judge(const Observation& seen, const DelayShape& shape, double scale,
-             const OutlierPrior& outliers, bool gate, Innovations& out) const noexcept {
+             const OutlierPrior& outliers, bool gate) noexcept {
     const double s2 = scale * scale;
     const double tail = scale * shape.tail;
+    Innovations& out = innovations_;
+    bool suspicious = false;
     for (std::size_t i = 0; i < kSize; ++i) {
-      const double nu = seen.sign * (seen.z - x_[i]) - d_[i];
       const double predicted = xx_[i] + 2.0 * seen.sign * xd_[i] + dd_[i];
-      const double spread = s2 * (predicted + shape.variance);
-      const double variance = spread + tail * tail;
-      const double centred = nu - tail;
-      Score score = tail > 0.0 ? late_score(nu, spread, tail) : normal_score(nu, spread);
-      double credit = 1.0;
-      if (gate && centred * centred > kSuspicious * variance) {
-        const double probability = centred > 0.0 ? outliers.late : outliers.early;
-        const double outlier =
-            probability / (10.0 * std::max(std::abs(centred), 3.0 * std::sqrt(variance)));
-        const double density = std::exp(score.log_density);
-        credit = density / (density + outlier);
-        score.log_density = std::log(density + outlier);
-      }
+      const double variance = s2 * (predicted + shape.variance) + tail * tail;
+      const double centred = seen.sign * (seen.z - x_[i]) - d_[i] - tail;
+      const double curvature = 1.0 / variance;
       out.centred[i] = centred;
       out.variance[i] = variance;
       out.predicted[i] = predicted;
-      out.log_density[i] = score.log_density;
-      out.credit[i] = credit;
-      out.slope[i] = score.slope * credit;
-      out.curvature[i] = score.curvature * credit;
+      out.slope[i] = centred * curvature;
+      out.curvature[i] = curvature;
+      out.credit[i] = 1.0;
     }
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double distance = out.centred[i] * out.slope[i];
+      out.log_variance[i] = quick_log(out.variance[i]);
+      out.log_density[i] = -0.5 * (distance + out.log_variance[i] + kLn2Pi);
+      suspicious |= distance > kSuspicious;
+    }
+    if (tail > 0.0) judge_late(s2 * shape.variance, s2, tail);
+    if (gate && suspicious) doubt(outliers);
   }
 
-  void correct(const Observation& seen, double scale, const Innovations& innovations) noexcept {
+  void correct(const Observation& seen, double scale) noexcept {
     const double s2 = scale * scale;
     for (std::size_t i = 0; i < kSize; ++i) {
       const double hx = xx_[i] + seen.sign * xd_[i];
       const double hy = xy_[i] + seen.sign * yd_[i];
       const double hd = xd_[i] + seen.sign * dd_[i];
-      const double move = seen.sign * innovations.slope[i] * s2;
-      const double shrink = innovations.curvature[i] * s2;
+      const double move = seen.sign * innovations_.slope[i] * s2;
+      const double shrink = innovations_.curvature[i] * s2;
       x_[i] += hx * move;
       y_[i] += hy * move;
       d_[i] += hd * move;
@@ -134,6 +135,7 @@ class ModelBank {
     }
   }
 
+  [[nodiscard]] const Innovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] Estimate estimate(std::size_t i) const noexcept {
     return {x_[i], y_[i], d_[i], xx_[i], xy_[i], xd_[i], yy_[i], yd_[i], dd_[i]};
   }
@@ -174,6 +176,7 @@ class ModelBank {
   [[nodiscard]] Estimate mixture(const Row& weight, double scale) const noexcept {
     Estimate mean;
     for (std::size_t i = 0; i < kSize; ++i) {
+      if (weight[i] == 0.0) continue;  // most of them
       mean.x += weight[i] * x_[i];
       mean.y += weight[i] * y_[i];
       mean.d += weight[i] * d_[i];
@@ -181,6 +184,7 @@ class ModelBank {
     const double per_s2 = 1.0 / (scale * scale);
     for (std::size_t i = 0; i < kSize; ++i) {
       const double w = weight[i];
+      if (w == 0.0) continue;
       const double dx = x_[i] - mean.x;
       const double dy = y_[i] - mean.y;
       const double dd = d_[i] - mean.d;
@@ -200,6 +204,37 @@ class ModelBank {
   /// Two sigma: below it the outlier hypothesis cannot win, so its density is not worth computing.
   static constexpr double kSuspicious = 4.0;
 
+  static constexpr double kLn2Pi = 1.8378770664093453;
+
+  /// Queueing noise: slope, curvature and density of the late shape.
+  void judge_late(double noise, double s2, double tail) noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double spread = s2 * innovations_.predicted[i] + noise;
+      const Score score = late_score(innovations_.centred[i] + tail, spread, tail);
+      innovations_.slope[i] = score.slope;
+      innovations_.curvature[i] = score.curvature;
+      innovations_.log_density[i] = score.log_density;
+    }
+  }
+
+  /// The outlier hypothesis: density probability / (10 |centred|), broad and scale-free.
+  void doubt(const OutlierPrior& outliers) noexcept {
+    Innovations& out = innovations_;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double centred = out.centred[i];
+      if (centred * centred <= kSuspicious * out.variance[i]) continue;
+      const double probability = centred > 0.0 ? outliers.late : outliers.early;
+      const double outlier =
+          probability / (10.0 * std::max(std::abs(centred), 3.0 * std::sqrt(out.variance[i])));
+      const double density = std::exp(out.log_density[i]);
+      out.credit[i] = density / (density + outlier);
+      out.log_density[i] = std::log(density + outlier);
+      out.slope[i] *= out.credit[i];
+      out.curvature[i] *= out.credit[i];
+    }
+  }
+
+  Innovations innovations_{};
   Row x_{}, y_{}, d_{}, xx_{}, xy_{}, xd_{}, yy_{}, yd_{}, dd_{};
 };
 

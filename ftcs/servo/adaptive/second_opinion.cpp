@@ -14,6 +14,8 @@ constexpr int kSteps = 3;
 /// probability of such luck is about (f / 2 k^2)^(f/2) / Gamma(f/2 + 1), below 1e-6 with sixteen
 /// messages. Fewer messages need more.
 constexpr double kContradiction = 10.0;
+/// Innovations below this many times the roughness need no fit to be believed.
+constexpr double kWorth = 3.0;
 constexpr double kFullFreedom = 9.0;
 /// Below this number of spare messages a fit proves nothing.
 constexpr std::size_t kLeastFreedom = 3;
@@ -157,19 +159,59 @@ typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
   return kept;
 }
 
-/// Median size of the innovations of one direction over the residual scale that the fit leaves in
-/// it; infinite for a direction that is not there.
+/// Upper median of the first `count` values, which are reordered; infinite if there are none.
 template <std::size_t Capacity>
-double SecondOpinion<Capacity>::contradiction(const Kept& kept, const Estimate& line,
-                                              double sign) const noexcept {
+double median_of(std::array<double, Capacity>& values, std::size_t count) noexcept {
+  if (count == 0) return std::numeric_limits<double>::infinity();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
+}
+
+/// Median size of the innovations of one direction.
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::typical_innovation(double sign) const noexcept {
   std::array<double, Capacity> sizes{};
   std::size_t count = 0;
   for (std::size_t k = 0; k < size_; ++k) {
     if (messages_[k].sign == sign) sizes[count++] = std::abs(messages_[k].innovation);
   }
-  if (count == 0) return std::numeric_limits<double>::infinity();
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count));
+  return median_of(sizes, count);
+}
+
+/// Median distance of a message from the chord of its neighbours of the same direction: noise
+/// without any model.
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
+  std::array<double, Capacity> distances{};
+  std::size_t count = 0;
+  const Message* before = nullptr;
+  const Message* middle = nullptr;
+  for (std::size_t k = 0; k < size_; ++k) {
+    const Message& m = messages_[(next_ + Capacity - size_ + k) % Capacity];
+    if (m.sign != sign) continue;
+    if (before != nullptr && m.time != before->time) {
+      const double share = (middle->time - before->time) / (m.time - before->time);
+      distances[count++] = std::abs(middle->z - before->z - share * (m.z - before->z));
+    }
+    before = middle;
+    middle = &m;
+  }
+  return count == 0 ? 0.0 : median_of(distances, count);
+}
+
+/// No fit leaves much less than the roughness; where innovations are of that size, save the work.
+template <std::size_t Capacity>
+bool SecondOpinion<Capacity>::worth_a_fit(double sign) const noexcept {
+  return typical_innovation(sign) > kWorth * roughness(sign);
+}
+
+/// Typical innovation of one direction over the residual scale that the fit leaves in it; infinite
+/// for a direction that is not there.
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::contradiction(const Kept& kept, const Estimate& line,
+                                              double sign) const noexcept {
+  const double typical = typical_innovation(sign);
   double squares = 0.0;
   double members = 0.0;
   for (std::size_t k = 0; k < kept.count; ++k) {
@@ -179,12 +221,13 @@ double SecondOpinion<Capacity>::contradiction(const Kept& kept, const Estimate& 
     squares += r * r;
     members += 1.0;
   }
-  return *middle / std::max(kSmallestScale, std::sqrt(squares / members));
+  return typical / std::max(kSmallestScale, std::sqrt(squares / std::max(members, 1.0)));
 }
 
 template <std::size_t Capacity>
 FreshFit SecondOpinion<Capacity>::consult(bool delay_free, double known_delay) const noexcept {
   FreshFit result;
+  if (!worth_a_fit(1.0) || !worth_a_fit(-1.0)) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
   Kept best_kept;

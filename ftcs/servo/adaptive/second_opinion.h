@@ -55,6 +55,9 @@ class SecondOpinion {
   [[nodiscard]] Estimate through(std::size_t a, std::size_t b, bool delay_free,
                                  double known_delay) const noexcept;
   [[nodiscard]] Kept closest(const Estimate& line) const noexcept;
+  [[nodiscard]] double typical_innovation(double sign) const noexcept;
+  [[nodiscard]] double roughness(double sign) const noexcept;
+  [[nodiscard]] bool worth_a_fit(double sign) const noexcept;
   [[nodiscard]] double contradiction(const Kept& kept, const Estimate& line,
                                      double sign) const noexcept;
   [[nodiscard]] double residual(const Message& message, const Estimate& line) const noexcept;
