@@ -15,7 +15,7 @@ constexpr int kSteps = 3;
 /// messages. Fewer messages need more.
 constexpr double kContradiction = 10.0;
 /// Innovations below this many times the roughness need no fit to be believed.
-constexpr double kWorth = 3.0;
+constexpr double kWorth = 4.0;
 constexpr double kFullFreedom = 9.0;
 /// Below this number of spare messages a fit proves nothing.
 constexpr std::size_t kLeastFreedom = 3;
@@ -159,11 +159,12 @@ typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
   return kept;
 }
 
-/// Upper median of the first `count` values, which are reordered; infinite if there are none.
+/// The value of the given rank among the first `count`, which are reordered; infinite if there are
+/// none.
 template <std::size_t Capacity>
-double median_of(std::array<double, Capacity>& values, std::size_t count) noexcept {
+double ranked(std::array<double, Capacity>& values, std::size_t count, std::size_t rank) noexcept {
   if (count == 0) return std::numeric_limits<double>::infinity();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
   return *middle;
 }
@@ -176,11 +177,11 @@ double SecondOpinion<Capacity>::typical_innovation(double sign) const noexcept {
   for (std::size_t k = 0; k < size_; ++k) {
     if (messages_[k].sign == sign) sizes[count++] = std::abs(messages_[k].innovation);
   }
-  return median_of(sizes, count);
+  return ranked(sizes, count, count / 2);
 }
 
-/// Median distance of a message from the chord of its neighbours of the same direction: noise
-/// without any model.
+/// Distance of a message from the chord of its neighbours of the same direction, lower quartile:
+/// noise without any model. One outlier spoils three chords, hence not the median.
 template <std::size_t Capacity>
 double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
   std::array<double, Capacity> distances{};
@@ -197,7 +198,7 @@ double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
     before = middle;
     middle = &m;
   }
-  return count == 0 ? 0.0 : median_of(distances, count);
+  return count == 0 ? 0.0 : ranked(distances, count, count / 4);
 }
 
 /// No fit leaves much less than the roughness; where innovations are of that size, save the work.
