@@ -42,6 +42,7 @@ bench: deps-test
 	@cmake --preset release > /dev/null
 	@cmake --build build-release -j $(JOBS)
 	@build-release/bin/ftcs_bench
+	@build-release/bin/analysis_bench
 	@bench/instructions.sh build-release
 
 check: deps-test configure
