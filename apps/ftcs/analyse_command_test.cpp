@@ -77,7 +77,7 @@ TEST_F(AnalyseCommand, leaves_with_2_when_it_is_called_wrongly) {
 }
 
 TEST_F(AnalyseCommand, leaves_with_1_and_one_line_when_the_data_is_no_good) {
-  std::ofstream(file("empty"));
+  std::ofstream(file("empty")) << "";
   std::ofstream(file("words")) << "1\n2\nthree\n";
   std::ofstream(file("binary"), std::ios::binary) << std::string(100, '\0');
   for (const char* name : {"empty", "words", "binary", "missing"}) {

@@ -56,7 +56,7 @@ void QuantileSketch::merge(const QuantileSketch& other) noexcept {
 
 std::uint64_t QuantileSketch::rank_of(double fraction) const noexcept {
   const double last = static_cast<double>(count_ - 1);
-  return static_cast<std::uint64_t>(std::clamp(fraction, 0.0, 1.0) * last + 0.5);
+  return static_cast<std::uint64_t>(std::llround(std::clamp(fraction, 0.0, 1.0) * last));
 }
 
 double QuantileSketch::quantile(double fraction) const noexcept {

@@ -21,12 +21,12 @@ TEST(QuantileSketch, agrees_with_sorting_within_its_bins) {
   for (const double value : values) sketch.add(value);
   std::sort(values.begin(), values.end());
   for (const double fraction : {0.0, 0.01, 0.05, 0.25, 0.75, 0.95, 0.99, 1.0}) {
-    const double exact = values[static_cast<std::size_t>(fraction * 19999.0 + 0.5)];
+    const double exact = values[static_cast<std::size_t>(std::lround(fraction * 19999.0))];
     EXPECT_NEAR(sketch.quantile(fraction), exact, std::abs(exact) / 128.0) << fraction;
   }
   for (double& value : values) value = std::abs(value);
   std::sort(values.begin(), values.end());
-  const double exact = values[static_cast<std::size_t>(0.95 * 19999.0 + 0.5)];
+  const double exact = values[static_cast<std::size_t>(std::lround(0.95 * 19999.0))];
   EXPECT_NEAR(sketch.absolute_quantile(0.95), exact, exact / 128.0);
 }
 

@@ -75,7 +75,7 @@ TEST_F(LineReaderTest, refuses_binary_data_with_the_line) {
   write(
       std::string_view("1\n2\n\x7f"
                        "ELF\0\1\n",
-                       12));
+                       11));
   EXPECT_EQ(lines().back(), path_ + ":3: expected text or gzip, got binary data");
 }
 

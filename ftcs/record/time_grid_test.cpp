@@ -26,9 +26,10 @@ TEST(TimeGrid, takes_the_median_step_and_leaves_gaps_open) {
 }
 
 TEST(TimeGrid, is_not_moved_by_jitter_nor_by_an_interval_that_is_slightly_wrong) {
-  std::vector<double> times;
-  for (int i = 0; i < 10000; ++i)
-    times.push_back(i * 1.001 + 0.3 * ((i * 7919 % 100) / 100.0 - 0.5));
+  std::vector<double> times = count_up(10000);
+  for (double& time : times) {
+    time = time * 1.001 + 0.3 * (std::fmod(time * 7919.0, 100.0) / 100.0 - 0.5);
+  }
   const auto grid = place_on_grid(count_up(times.size()), times, 1.0);
   ASSERT_TRUE(grid.ok());
   EXPECT_EQ(grid->values.size(), times.size());

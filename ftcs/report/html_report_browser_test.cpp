@@ -36,7 +36,7 @@ HtmlReport report_of_every_kind() {
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     offsets[i] = 20.0 * std::sin(static_cast<double>(i * i % 1000)) + (i == 12345 ? 400.0 : 0.0);
   }
-  offsets[5] = NAN;
+  offsets[5] = kNoFigure;
   Plot trace{"Offset", "time / s", "offset / ns", false, false, PlotStyle::kLine, {}, "One spike."};
   trace.series = {trace_series("</script><i>", offsets, 0.1, 1.0),
                   trace_series("b", offsets, 0.3, 2.0)};

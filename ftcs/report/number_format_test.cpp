@@ -2,9 +2,11 @@
 // World: figures as people read them.
 #include "ftcs/report/number_format.h"
 
-#include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
+
+#include "ftcs/analysis/statistics.h"
 
 namespace ftcs {
 namespace {
@@ -18,10 +20,10 @@ TEST(NumberFormat, keeps_the_digits_that_are_asked_for) {
 }
 
 TEST(NumberFormat, shows_no_figure_as_a_dash) {
-  EXPECT_EQ(significant(NAN), "-");
-  EXPECT_EQ(fixed(INFINITY, 1), "-");
-  EXPECT_EQ(seconds_text(NAN), "-");
-  EXPECT_EQ(fraction_text(NAN), "-");
+  EXPECT_EQ(significant(kNoFigure), "-");
+  EXPECT_EQ(fixed(std::numeric_limits<double>::infinity(), 1), "-");
+  EXPECT_EQ(seconds_text(kNoFigure), "-");
+  EXPECT_EQ(fraction_text(kNoFigure), "-");
 }
 
 TEST(NumberFormat, picks_the_unit_that_suits) {

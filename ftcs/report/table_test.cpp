@@ -2,9 +2,9 @@
 // World: one small table on its three ways out.
 #include "ftcs/report/table.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
+
+#include "ftcs/analysis/statistics.h"
 
 namespace ftcs {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 Table servos() {
   Table table({"servo", "RMS / ns", "cycles"});
   table.add_row({"FTCS", Cell::fixed(126.04, 1), Cell::count(1)});
-  table.add_row({"linuxptp, PI", Cell::fixed(9.5, 1), Cell::fixed(NAN, 0)});
+  table.add_row({"linuxptp, PI", Cell::fixed(9.5, 1), Cell::fixed(kNoFigure, 0)});
   return table;
 }
 
@@ -40,7 +40,7 @@ TEST(Table, does_not_pass_on_control_characters) {
 TEST(Table, writes_csv_that_reads_back_exactly) {
   Table table({"name", "value, exact"});
   table.add_row({"a \"quoted\"", Cell::fixed(0.1, 0)});
-  table.add_row({"two\nlines", Cell::significant(NAN)});
+  table.add_row({"two\nlines", Cell::significant(kNoFigure)});
   EXPECT_EQ(table.to_csv(), "name,\"value, exact\"\n\"a \"\"quoted\"\"\",0.1\n\"two\nlines\",\n");
 }
 
