@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -27,8 +28,8 @@ struct ConvergedBand {
 class ConvergenceLatch {
  public:
   /// Takes the next offset and returns whether the latch is closed with it.
-  constexpr bool update(double offset_ns, const ConvergedBand& band, std::uint32_t dwell) noexcept {
-    const double magnitude = offset_ns < 0.0 ? -offset_ns : offset_ns;
+  bool update(double offset_ns, const ConvergedBand& band, std::uint32_t dwell) noexcept {
+    const double magnitude = std::abs(offset_ns);
     if (closed_) {
       closed_ = magnitude < band.leave.ns();
       if (!closed_) inside_ = 0;

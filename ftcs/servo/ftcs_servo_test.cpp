@@ -194,8 +194,8 @@ TEST(FtcsServo, equal_enter_and_leave_are_the_memoryless_switch_of_table_1) {
 TEST(FtcsServo, the_band_has_hysteresis) {
   FtcsConfig config = with_gain(0.5);
   config.converged_band = {Nanoseconds{50}, Nanoseconds{500}};
-  // First action, too far, inside, between, between, left, between, inside.
-  EXPECT_EQ(gains_for(config, {10, 60, -49, 499, -60, -500, 60, 49}),
+  // First action, at the edge, inside, between, between, left, between, inside.
+  EXPECT_EQ(gains_for(config, {10, 50, -49, 499, -60, -500, 60, 49}),
             (std::vector<double>{1.0, 1.0, 0.5, 0.5, 0.5, 1.0, 1.0, 0.5}));
 }
 
