@@ -122,4 +122,13 @@ ServoSnapshot AnyServo::snapshot() const noexcept {
   return std::visit([](const auto& servo) noexcept { return servo.snapshot(); }, servo_);
 }
 
+ServoSnapshot AnyServo::snapshot_at(const ClockReading& now) const noexcept {
+  return std::visit(
+      [&now](const auto& servo) noexcept {
+        if constexpr (requires { servo.snapshot_at(now); }) return servo.snapshot_at(now);
+        return servo.snapshot();
+      },
+      servo_);
+}
+
 }  // namespace ftcs

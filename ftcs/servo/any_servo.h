@@ -96,6 +96,8 @@ class AnyServo {
   /// know.
   void on_step(Duration step) noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;
+  /// As of `now`, for a servo whose belief ages (holdover); otherwise as of the last message.
+  [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;
 
  private:
   Variant servo_;

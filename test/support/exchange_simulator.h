@@ -99,6 +99,11 @@ class ExchangeSimulator {
   }
 
   Servo& servo() { return servo_; }
+  ClockReading reading() const {
+    return {FreeRunningTime{instant(now_, lead_)}, LocalTime{instant(now_, lead_ + local_lead_)}};
+  }
+  /// True offset of the steered clock now.
+  double error_ns() const { return lead_ + local_lead_ - reference_lead_; }
 
  private:
   struct Pending {
@@ -186,10 +191,6 @@ class ExchangeSimulator {
     pair.free_running = FreeRunningTime{instant(now_, lead_)};
     pair.local = LocalTime{instant(now_, lead_ + local_lead_)};
     return pair;
-  }
-
-  ClockReading reading() const {
-    return {FreeRunningTime{instant(now_, lead_)}, LocalTime{instant(now_, lead_ + local_lead_)}};
   }
 
   void process_events(double until) {
@@ -300,7 +301,10 @@ class ExchangeSimulator {
   }
 
   void count_coverage(double error) {
-    const double sigma = servo_.snapshot().offset_sigma_ns;
+    double sigma = servo_.snapshot().offset_sigma_ns;
+    if constexpr (requires { servo_.snapshot_at(reading()); }) {
+      sigma = servo_.snapshot_at(reading()).offset_sigma_ns;
+    }
     if (!(sigma > 0.0)) return;
     covered_ += 1.0;
     result_.inside_1 += std::abs(error) <= sigma ? 1.0 : 0.0;

@@ -18,6 +18,8 @@ constexpr double kCorrectionShare = 0.25;
 constexpr double kPlausibleDeviation = 0.5;
 /// 2^40 ns, 18 minutes: resolved to 2^-12 ns.
 constexpr double kLargestOffsetNs = 1099511627776.0;
+/// Cycles without a message: two lost in a row are bad luck, five are an outage.
+constexpr double kSilence = 5.0;
 /// The delay shifts the moment to which a message belongs; more than this is not believed there.
 constexpr double kLongestDelayNs = 1e9;
 
@@ -133,37 +135,56 @@ ServoUpdate BasicAdaptiveServo<Grid, Window>::update(const TimestampPair& pair,
 /// r = 1 + y: free running per reference. The estimate says that the free-running clock showed
 /// F_e = event + base + x at the event; so the reference now is event + (F_now - F_e) / r.
 template <class Grid, std::size_t Window>
-ServoUpdate BasicAdaptiveServo<Grid, Window>::steer(const ClockReading& now) noexcept {
+typename BasicAdaptiveServo<Grid, Window>::Belief BasicAdaptiveServo<Grid, Window>::believe(
+    const ClockReading& now) const noexcept {
   const Estimate& e = estimator_.estimate();
-  const double y = e.y / meter_.interval_ns();
-  const double r = 1.0 + y;
-  // Before the rate is known, or on nonsense: no command is better than any.
-  if (!(std::abs(y) < kPlausibleDeviation)) return {};
+  Belief belief;
+  belief.rate_deviation = e.y / meter_.interval_ns();
+  const double r = 1.0 + belief.rate_deviation;
   const Duration since_event = now.free_running.since_epoch() - event_.since_epoch() - base_;
   const double elapsed_free = since_event.ns() - e.x;  // F_now - F_e
   const ReferenceTime reference_now =
-      event_ + since_event - Duration::from_ns(e.x + elapsed_free * (y / r));
-  const double offset_ns = offset_from_reference(now.local, reference_now).ns();
-  const adaptive::Steered steered =
-      steering_.steer({offset_ns, r}, kCorrectionShare * meter_.interval_ns());
+      event_ + since_event - Duration::from_ns(e.x + elapsed_free * (belief.rate_deviation / r));
+  belief.offset_ns = offset_from_reference(now.local, reference_now).ns();
+  belief.cycles = elapsed_free / r / meter_.interval_ns();
+  return belief;
+}
+
+template <class Grid, std::size_t Window>
+ServoUpdate BasicAdaptiveServo<Grid, Window>::steer(const ClockReading& now) noexcept {
+  const Belief belief = believe(now);
+  // Before the rate is known, or on nonsense: no command is better than any.
+  if (!(std::abs(belief.rate_deviation) < kPlausibleDeviation)) return {};
+  const adaptive::Steered steered = steering_.steer({belief.offset_ns, 1.0 + belief.rate_deviation},
+                                                    kCorrectionShare * meter_.interval_ns());
   snapshot_.state = steered.stepped ? ServoState::kJump : ServoState::kLocked;
-  publish(offset_ns);
+  publish(belief);
   return {SampleVerdict::kUsed, true, steered.command};
 }
 
 template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::publish(double offset_ns) noexcept {
-  const Estimate& e = estimator_.estimate();
-  const double s = estimator_.scale();
+void BasicAdaptiveServo<Grid, Window>::publish(const Belief& belief) noexcept {
   snapshot_.offset_known = true;
-  snapshot_.offset = Duration::from_ns(offset_ns);
-  snapshot_.path_delay = Duration::from_ns(e.d);
-  snapshot_.rate_ratio = Rate::from_ratio(1.0 / (1.0 + e.y / meter_.interval_ns()));
+  snapshot_.offset = Duration::from_ns(belief.offset_ns);
+  snapshot_.path_delay = Duration::from_ns(estimator_.estimate().d);
+  snapshot_.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
   snapshot_.offset_gain = estimator_.gain();
-  snapshot_.offset_sigma_ns = s * std::sqrt(e.xx);
-  snapshot_.rate_sigma_ppb = s * std::sqrt(e.yy) / meter_.interval_ns() * 1e9;
-  snapshot_.path_delay_sigma_ns = s * std::sqrt(e.dd);
-  snapshot_.timestamp_noise_ns = s;
+  snapshot_.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);
+  snapshot_.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
+  snapshot_.path_delay_sigma_ns = estimator_.delay_sigma_ns();
+  snapshot_.timestamp_noise_ns = estimator_.scale();
+}
+
+template <class Grid, std::size_t Window>
+ServoSnapshot BasicAdaptiveServo<Grid, Window>::snapshot_at(
+    const ClockReading& now) const noexcept {
+  ServoSnapshot snapshot = snapshot_;
+  if (!snapshot.offset_known) return snapshot;
+  const Belief belief = believe(now);
+  snapshot.offset = Duration::from_ns(belief.offset_ns);
+  snapshot.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);
+  if (belief.cycles > kSilence) snapshot.state = ServoState::kHoldover;
+  return snapshot;
 }
 
 template class BasicAdaptiveServo<adaptive::FullGrid, 32>;

@@ -38,15 +38,25 @@ class BasicAdaptiveServo {
 
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept;
+  /// As of the last message that moved the servo.
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
+  /// As of `now`: the offset that the clock has by the servo's belief, and how far that belief can
+  /// be trusted. Without messages for a while the state is holdover and the deviation grows.
+  [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;
 
  private:
   void forget() noexcept;
   void rebase() noexcept;
   [[nodiscard]] adaptive::Observation observe(const TimestampPair& pair) noexcept;
   [[nodiscard]] bool ready() const noexcept;
+  struct Belief {
+    double rate_deviation = 0.0;  ///< y: free running per reference, less one
+    double offset_ns = 0.0;       ///< local - reference
+    double cycles = 0.0;          ///< since the last message
+  };
+  [[nodiscard]] Belief believe(const ClockReading& now) const noexcept;
   [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
-  void publish(double offset_ns) noexcept;
+  void publish(const Belief& belief) noexcept;
 
   AdaptiveConfig config_;
   adaptive::Estimator<Grid, Window> estimator_;

@@ -179,6 +179,51 @@ TEST(AdaptiveServo, hostile_input_leaves_numbers_finite_and_is_forgotten) {
   }
 }
 
+/// Pooled over quiet, wandering, loaded and disturbed runs, between messages too.
+TEST(AdaptiveServo, reported_deviation_is_honest) {
+  std::vector<ExchangeScenario> scenarios(6);
+  scenarios[1].wander = 1e-8;
+  scenarios[2].sine_ppm = 0.5;
+  scenarios[3].spike_probability = 0.1;
+  scenarios[4].forward_load_ns = 1000.0;
+  scenarios[5].outage_start_s = 600.0;
+  scenarios[5].outage_end_s = 660.0;
+  double inside[3] = {};
+  double runs = 0.0;
+  for (const ExchangeScenario& scenario : scenarios) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      ExchangeSimulator<AdaptiveServo> simulator(scenario, AdaptiveServo{}, seed);
+      const ExchangeResult result = simulator.run();
+      inside[0] += result.inside_1;
+      inside[1] += result.inside_2;
+      inside[2] += result.inside_3;
+      runs += 1.0;
+    }
+  }
+  EXPECT_GE(inside[0] / runs, 0.60);
+  EXPECT_LE(inside[0] / runs, 0.76);
+  EXPECT_GE(inside[1] / runs, 0.92);
+  EXPECT_LE(inside[1] / runs, 0.985);
+  EXPECT_GE(inside[2] / runs, 0.99);
+}
+
+TEST(AdaptiveServo, holdover_is_announced_and_its_bound_grows) {
+  ExchangeScenario scenario;
+  scenario.cycles = 300;
+  scenario.wander = 1e-9;
+  scenario.outage_start_s = 200.0;
+  scenario.outage_end_s = 400.0;
+  ExchangeSimulator<AdaptiveServo> simulator(scenario, AdaptiveServo{}, 3);
+  (void)simulator.run();
+  const ClockReading late = simulator.reading();
+  const ServoSnapshot before = simulator.servo().snapshot();
+  const ServoSnapshot after = simulator.servo().snapshot_at(late);
+  EXPECT_EQ(before.state, ServoState::kLocked);
+  EXPECT_EQ(after.state, ServoState::kHoldover);
+  EXPECT_GT(after.offset_sigma_ns, 10.0 * before.offset_sigma_ns);
+  EXPECT_LT(std::abs(simulator.error_ns() - after.offset.ns()), 4.0 * after.offset_sigma_ns);
+}
+
 TEST(AdaptiveServo, neither_allocates_nor_grows) {
   static_assert(sizeof(AdaptiveServo) < 16 * 1024);
   AdaptiveServo servo;

@@ -36,6 +36,13 @@ class Estimator {
   /// At the event of the last message; covariances in units of scale().
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
+  /// Honest standard deviation of the offset `cycles` after the last message, ns: what the filters
+  /// believe, grown by the process noise that they cannot exclude, widened while recent innovations
+  /// are larger than believed, plus what the shape of the delay noise leaves open.
+  [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
+  /// Of the rate, ns per cycle, and of the path delay, ns, at the last message.
+  [[nodiscard]] double rate_sigma_ns() const noexcept;
+  [[nodiscard]] double delay_sigma_ns() const noexcept;
   /// Noise of one timestamp of the given direction, ns.
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
@@ -66,6 +73,9 @@ class Estimator {
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
+  void follow_surprise(std::size_t side) noexcept;
+  [[nodiscard]] double widening() const noexcept;
+  [[nodiscard]] double floor_doubt_ns() const noexcept;
 
   KnownDelay known_delay_{};
   Bank bank_{};
@@ -89,6 +99,8 @@ class Estimator {
   double scale_ = 100.0;
   double robust_scale_ = 100.0;
   double gain_ = 1.0;
+  double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations
+  NoiseModel process_{};         ///< mean of the models' noise under their weights
   Estimate mixed_{};
 
   static constexpr double kOutlierStart = 0.03;
