@@ -54,16 +54,20 @@ Wrong set_duration(const std::string& text, const char* flag, Duration& target) 
   return std::nullopt;
 }
 
+std::string servo_names() {
+  std::string names;
+  for (const ServoKindName& known : kServoKinds) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
+  }
+  return names;
+}
+
 Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   ServoConfig& servo = options.servo;
   if (!arguments.servo.empty()) {
     const auto kind = servo_kind_from_name(arguments.servo);
     if (!kind) {
-      std::string names;
-      for (const ServoKindName& known : kServoKinds) {
-        names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
-      }
-      return fmt::format("--servo: unknown servo '{}' (known: {})", arguments.servo, names);
+      return fmt::format("--servo: unknown servo '{}' (known: {})", arguments.servo, servo_names());
     }
     servo.kind = *kind;
   }
@@ -167,6 +171,7 @@ void refuse(CLI::App& command, const char* flag, const char* reason) {
 
 void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
   command.set_help_flag("-h,--help", "print this help and exit");
+  command.set_version_flag("-v,--version", "ftcs " FTCS_VERSION, "print the version and exit");
   command.add_option("-i", arguments.interfaces, "network interface, for example eth0")
       ->type_name("NAME");
   command.add_option("-f", arguments.config_file, "configuration file in ptp4l's format")
@@ -210,7 +215,7 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
 void add_own_flags(CLI::App& command, PtpArguments& arguments) {
   command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
       ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
-  command.add_option("--servo", arguments.servo, "ftcs (default), pics, linuxptp-pi or none");
+  command.add_option("--servo", arguments.servo, servo_names() + "; default ftcs");
   command.add_option("--offset-gain", arguments.offset_gain, "ftcs: p inside the band, 0 to 1");
   command.add_option("--converged-band", arguments.converged_band,
                      "ftcs: B, as ENTER[:LEAVE], for example 1us:5us");

@@ -85,6 +85,25 @@ void PtpPort::perform(const ptp::ActionList& actions) {
   }
 }
 
+void PtpPort::log_unusual(const ptp::Counters& counters) {
+  std::string text;
+  const auto add = [&text](std::string_view name, std::uint64_t count) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count);
+  };
+  // What stands before it counts good messages.
+  for (auto i = static_cast<std::size_t>(ptp::Counter::kTruncated); i < ptp::kCounters; ++i) {
+    const auto counter = static_cast<ptp::Counter>(i);
+    add(to_string(counter), counters[counter]);
+  }
+  if (const platform::PtpSocket* socket = transport_.socket()) {
+    add("receive_stamp_missing", socket->counters().receive_stamp_missing);
+    add("transmit_stamp_late", socket->counters().transmit_stamp_late);
+    add("oversized_datagrams", socket->counters().oversized);
+  }
+  add("realtime_steps", timestamps_->realtime_steps());
+  if (!text.empty()) log_(LogLevel::kNotice, "counted besides: {}", text);
+}
+
 void PtpPort::fail(const std::string& reason) {
   if (!failure_) failure_ = reason;
 }

@@ -16,6 +16,7 @@
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/platform/timestamp_clock.h"
 #include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/counters.h"
 
 namespace ftcs::app {
 
@@ -49,6 +50,8 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] virtual int finish() = 0;
 
   void perform(const ptp::ActionList& actions);
+  /// Everything that a port counted beside good messages, as one line; nothing if there is none.
+  void log_unusual(const ptp::Counters& counters);
   /// Ends run() with an error line.
   void fail(const std::string& reason);
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }

@@ -210,6 +210,7 @@ int PtpReceiver::finish() {
   if (since_lock_.count() > 0) {
     log()(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
   }
+  log_unusual(core_.counters());
   return locked ? kSuccess : kNotLocked;
 }
 

@@ -71,6 +71,7 @@ int PtpTransmitter::finish() {
   log()(LogLevel::kNotice, "summary: {}, {} Syncs sent, {} delay requests answered",
         transmitting ? "transmitting" : "not transmitting", counters[Counter::kSyncSent],
         counters[Counter::kDelayRespSent]);
+  log_unusual(counters);
   return transmitting ? kSuccess : kNotLocked;
 }
 

@@ -111,23 +111,21 @@ std::optional<OsError> PtpSocket::join_multicast(int fd) const {
   // On loopback the copy for ourselves is the only way to the neighbour process.
   const int loop = interface_.loopback ? 1 : 0;
   const int only_joined = 0;
-  int result = kernel_->set_option(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group);
-  if (result >= 0) {
-    result = kernel_->set_option(fd, IPPROTO_IP, IP_MULTICAST_IF, &group, sizeof group);
+  struct Option {
+    int name;
+    const void* value;
+    socklen_t size;
+  };
+  const std::array options{Option{IP_ADD_MEMBERSHIP, &group, sizeof group},
+                           Option{IP_MULTICAST_IF, &group, sizeof group},
+                           Option{IP_MULTICAST_LOOP, &loop, sizeof loop},
+                           Option{IP_MULTICAST_ALL, &only_joined, sizeof only_joined},
+                           Option{IP_MULTICAST_TTL, &config_.ttl, sizeof config_.ttl}};
+  for (const Option& option : options) {
+    const int result = kernel_->set_option(fd, IPPROTO_IP, option.name, option.value, option.size);
+    if (result < 0) return os_error(-result, "multicast on " + config_.interface);
   }
-  if (result >= 0) {
-    result = kernel_->set_option(fd, IPPROTO_IP, IP_MULTICAST_LOOP, &loop, sizeof loop);
-  }
-  if (result >= 0) {
-    result =
-        kernel_->set_option(fd, IPPROTO_IP, IP_MULTICAST_ALL, &only_joined, sizeof only_joined);
-  }
-  if (result >= 0) {
-    result =
-        kernel_->set_option(fd, IPPROTO_IP, IP_MULTICAST_TTL, &config_.ttl, sizeof config_.ttl);
-  }
-  if (result >= 0) return std::nullopt;
-  return os_error(-result, "multicast on " + config_.interface);
+  return std::nullopt;
 }
 
 std::optional<OsError> PtpSocket::enable_timestamps(int fd) {

@@ -53,6 +53,7 @@ wait $step || fail "--first-step: exit code $?, expected 0 (locked)"
 wait $far; [ $? -eq 1 ] || fail "2 s away without --first-step: expected exit code 1"
 grep -q "first offset is 2.000 s, more than 1 s" "$folder/far.errors" || fail "no clear error when 2 s away"
 wait $alone; [ $? -eq 3 ] || fail "nobody transmits in domain 9: expected exit code 3"
+grep -q "counted besides: wrong_domain [0-9]" "$folder/alone" || fail "messages of another domain are not reported"
 wait $none; [ $? -eq 3 ] || fail "1 ms away and free running: expected exit code 3"
 grep -q "1 steps" "$folder/step" || fail "--first-step: no step"
 
