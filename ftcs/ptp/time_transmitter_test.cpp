@@ -116,6 +116,13 @@ TEST_F(Transmitter, keeps_its_schedule) {
   EXPECT_EQ(syncs, 64);
 }
 
+TEST_F(Transmitter, being_called_late_does_not_shift_its_schedule) {
+  static_cast<void>(transmitter_.on_timer(raw(7ms)));
+  EXPECT_EQ(transmitter_.deadline(), raw(125ms));
+  static_cast<void>(transmitter_.on_timer(raw(130ms)));
+  EXPECT_EQ(transmitter_.deadline(), raw(250ms));
+}
+
 TEST_F(Transmitter, sends_no_burst_after_it_has_slept) {
   static_cast<void>(transmitter_.on_timer(raw(0s)));
   EXPECT_EQ(sent(transmitter_.on_timer(raw(60s))).size(), 2U);
@@ -157,6 +164,8 @@ TEST_F(Transmitter, a_stamp_before_the_epoch_is_not_sent) {
   const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
   EXPECT_TRUE(transmitter_.on_transmit_timestamp(id, ReferenceTime::from_ns(-1), raw(0s)).empty());
   EXPECT_EQ(count(Counter::kUnusableTime), 1U);
+  EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
+  EXPECT_EQ(count(Counter::kActionsDropped), 0U);
 }
 
 TEST_F(Transmitter, answers_a_delay_request_with_its_receive_stamp) {

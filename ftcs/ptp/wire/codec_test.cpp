@@ -121,6 +121,8 @@ TEST(Codec, refuses_a_billion_nanoseconds) {
   std::ranges::copy(billion, octets.begin() + 40);
   const auto error = error_of(octets);
   EXPECT_EQ(error.reason, DecodeReason::kBadTimestamp);
+  EXPECT_EQ(error.expected, 999'999'999U);
+  EXPECT_EQ(error.received, 1'000'000'000U);
   EXPECT_EQ(error.offset, 40U);
   octets[43] = 0xFF;
   octets[42] = 0xC9;  // 999,999,999
@@ -166,7 +168,20 @@ TEST(Codec, refuses_tlvs_that_are_odd_or_end_behind_the_message) {
     EXPECT_EQ(error.reason, DecodeReason::kMalformedTlv);
     EXPECT_EQ(error.received, length);
     EXPECT_EQ(error.expected, length == 1 ? 0U : 2U);
+    EXPECT_EQ(error.offset, kDelayResp.size() + 2);
   }
+}
+
+TEST(Codec, checks_a_tlv_that_is_only_a_header) {
+  Octets octets = kDelayResp;
+  octets.insert(octets.end(), {0x00, 0x08, 0x00, 0x02});
+  octets[3] = static_cast<std::uint8_t>(octets.size());
+  EXPECT_EQ(error_of(octets).reason, DecodeReason::kMalformedTlv);
+}
+
+TEST(Codec, a_header_alone_is_asked_for_the_length_that_it_promises) {
+  const Octets header(kDelayResp.begin(), kDelayResp.begin() + 34);
+  EXPECT_EQ(error_of(header).expected, 54U);
 }
 
 TEST(Codec, refuses_to_write_a_time_before_the_epoch) {
