@@ -2,6 +2,7 @@
 #include "ftcs/experiment/toml_table.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <sstream>
@@ -55,7 +56,11 @@ TomlTable::TomlTable(toml::table root, std::string file)
       file_(std::move(file)) {}
 
 TomlTable::TomlTable(const TomlTable& parent, const toml::table& table, std::string name)
-    : root_(parent.root_), table_(&table), file_(parent.file_), name_(std::move(name)) {}
+    : root_(parent.root_),
+      table_(&table),
+      file_(parent.file_),
+      name_(std::move(name)),
+      cycle_ns_(parent.cycle_ns_) {}
 
 std::string TomlTable::where(const toml::source_region& region) const {
   if (region.begin.line == 0) return file_;
@@ -100,11 +105,28 @@ std::optional<double> TomlTable::quantity(
 }
 
 std::optional<Duration> TomlTable::duration(std::string_view key, Range ns) {
+  known_.emplace(key);
+  if (const auto cycles = in_cycles(key)) {
+    return Duration::from_ns(in_range(key, *cycles * cycle_ns_, ns));
+  }
   const auto value =
       quantity(key, "a time such as \"100 us\" (ns, us, ms, s, min, h, d)", duration_ns);
   if (!value) return std::nullopt;
-  (void)in_range(key, *value, ns);
-  return Duration::from_ns(*value);
+  return Duration::from_ns(in_range(key, *value, ns));
+}
+
+/// "50 cycles", where a cycle is known.
+std::optional<double> TomlTable::in_cycles(std::string_view key) const {
+  constexpr std::string_view kUnit = "cycles";
+  const toml::node* node = table_->get(key);
+  if (cycle_ns_ <= 0.0 || node == nullptr) return std::nullopt;
+  const auto text = node->value_exact<std::string>();
+  if (!text || !text->ends_with(kUnit)) return std::nullopt;
+  return parse_ratio(std::string_view(*text).substr(0, text->size() - kUnit.size()));
+}
+
+std::string TomlTable::beside(const std::string& path) const {
+  return (std::filesystem::path(file_).parent_path() / path).string();
 }
 
 std::optional<double> TomlTable::ratio(std::string_view key, Range range) {
@@ -253,12 +275,16 @@ toml::table parse_toml_text(std::string_view text, const std::string& name) {
   }
 }
 
-toml::table parse_toml_file(const std::string& path) {
+std::string read_text_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream content;
-  if (file) content << file.rdbuf();
-  if (!file) throw ScenarioError(fmt::format("{}: cannot be read", path));
-  return parse_toml_text(content.str(), path);
+  if (file && file.peek() != std::ifstream::traits_type::eof()) content << file.rdbuf();
+  if (!file && !file.eof()) throw ScenarioError(fmt::format("{}: cannot be read", path));
+  return content.str();
+}
+
+toml::table parse_toml_file(const std::string& path) {
+  return parse_toml_text(read_text_file(path), path);
 }
 
 }  // namespace ftcs::experiment

@@ -50,6 +50,11 @@ class TomlTable {
   /// The keys as they stand, for a table whose keys are names.
   [[nodiscard]] std::vector<std::string> keys() const;
 
+  /// Times below may then be written as "50 cycles"; holds for tables read from this one later.
+  void set_cycle(Duration cycle) noexcept { cycle_ns_ = cycle.ns(); }
+  /// A path as it stands in the file: relative to the file, not to the working directory.
+  [[nodiscard]] std::string beside(const std::string& path) const;
+
   /// Complains if a key of this table was never asked for.
   void finish() const;
   [[noreturn]] void fail(std::string_view key, const std::string& message,
@@ -62,6 +67,7 @@ class TomlTable {
   [[nodiscard]] std::string where(const toml::source_region& region) const;
   std::optional<double> quantity(std::string_view key, std::string_view what,
                                  std::optional<double> (*parse)(std::string_view) noexcept);
+  [[nodiscard]] std::optional<double> in_cycles(std::string_view key) const;
   double in_range(std::string_view key, double value, Range range) const;
 
   // Shared, because a copy of a toml::table forgets its lines.
@@ -69,11 +75,13 @@ class TomlTable {
   const toml::table* table_;
   std::string file_;
   std::string name_;
+  double cycle_ns_ = 0.0;
   std::set<std::string, std::less<>> known_;
 };
 
 /// The root of a file or text. Throws ScenarioError on a syntax error or an unreadable file.
 [[nodiscard]] toml::table parse_toml_file(const std::string& path);
+[[nodiscard]] std::string read_text_file(const std::string& path);
 [[nodiscard]] toml::table parse_toml_text(std::string_view text, const std::string& name);
 
 }  // namespace ftcs::experiment

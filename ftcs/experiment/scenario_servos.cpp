@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/experiment/scenario_servos.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace ftcs::experiment {
+namespace {
+
+constexpr Range kNotNegative{0.0, 1e18};
+constexpr Range kGain{0.0, 10.0};
+
+/// linuxptp's turn-around is measured on the steered clock, and no delay is refused.
+void behave_as_linuxptp(TwoWayConfig& two_way) {
+  two_way.path_delay.rate_compensated = false;
+  two_way.path_delay.lowest = Nanoseconds{-100'000'000};
+  two_way.gate_enabled = false;
+}
+
+ServoConfig default_config(ServoKind kind, const Scenario& scenario) {
+  const sim::NodeSpec& node = scenario.world.nodes.front();
+  ServoConfig config;
+  config.kind = kind;
+  config.limits = node.limits;
+  if (scenario.world.interval_spread == 1.0) {
+    config.sync_interval = Nanoseconds{scenario.world.interval.rounded_ns()};
+  }
+  if (scenario.network == "one-way") {
+    config.two_way.fixed_path_delay = Nanoseconds{node.forward.delay.rounded_ns()};
+  }
+  config.adaptive.steering.rate = node.limits;
+  config.adaptive.steering.first_step_allowed = node.discipline.step.mode != StepMode::kNever;
+  config.kalman.limits = node.limits;
+  if (kind == ServoKind::kLinuxptpPi) {
+    behave_as_linuxptp(config.two_way);
+    const bool may_step = node.discipline.step.mode != StepMode::kNever;
+    config.linuxptp_pi.first_step_threshold =
+        may_step ? node.discipline.step.threshold : Nanoseconds{0};
+  }
+  return config;
+}
+
+/// Names that stand for a servo with a parameter of its own.
+std::optional<ScenarioServo> named_servo(const std::string& name, const Scenario& scenario) {
+  if (name == "ftcs-p1") {  // plain FTCS, paper eq. (18)
+    ScenarioServo servo{name, default_config(ServoKind::kFtcs, scenario)};
+    servo.config.ftcs.offset_gain = 1.0;
+    return servo;
+  }
+  const auto kind = servo_kind_from_name(name);
+  if (!kind) return std::nullopt;
+  return ScenarioServo{name, default_config(*kind, scenario)};
+}
+
+const std::vector<std::string>& all_servos() {
+  static const std::vector<std::string> kAll = {
+      "adaptive",    "ftcs",       "ftcs-p1", "pics",
+      "linuxptp-pi", "regression", "pid",     "frequency-compensated",
+      "kalman"};
+  return kAll;
+}
+
+std::string known_names() {
+  std::string names = "ftcs-p1";
+  for (const ServoKindName& entry : kServoKinds) names += ", " + std::string(entry.name);
+  return names;
+}
+
+void read_kalman_noise(TomlTable& table, baseline::KalmanNoise& noise) {
+  if (const auto v = table.duration("timestamp_noise", kNotNegative))
+    noise.forward_ns = noise.backward_ns = v->ns();
+  if (const auto v = table.duration("backward_noise", kNotNegative)) noise.backward_ns = v->ns();
+  if (const auto v = table.ratio("white_fm", {0.0, 0.5})) noise.white_fm_1s = *v;
+  if (const auto v = table.ratio_per_root_second("random_walk_fm")) noise.random_walk_fm_1s = *v;
+}
+
+void read_parameters(TomlTable& table, ServoConfig& config) {
+  if (const auto v = table.number("offset_gain", {0.0, 1.0})) config.ftcs.offset_gain = *v;
+  if (const auto v = table.duration("band_enter", kNotNegative))
+    config.ftcs.converged_band.enter = *v;
+  if (const auto v = table.duration("band_leave", kNotNegative))
+    config.ftcs.converged_band.leave = *v;
+  if (const auto v = table.duration("correction_time", kNotNegative)) {
+    config.ftcs.correction_time = Nanoseconds{v->rounded_ns()};
+  }
+  if (const auto v = table.number("proportional_gain", kGain)) {
+    config.pics.proportional_gain = *v;
+    config.pid.proportional_gain = *v;
+  }
+  if (const auto v = table.number("integral_gain", kGain)) {
+    config.pics.integral_gain = *v;
+    config.pid.integral_gain = *v;
+  }
+  if (const auto v = table.number("derivative_gain", kGain)) config.pid.derivative_gain = *v;
+  if (const auto v = table.boolean("gate")) config.two_way.gate_enabled = *v;
+  read_kalman_noise(table, config.kalman.noise);
+}
+
+ScenarioServo read_servo(TomlTable table, const Scenario& scenario) {
+  const auto kind_name = table.text("kind");
+  const auto kind = kind_name ? servo_kind_from_name(*kind_name) : std::nullopt;
+  if (!kind) table.fail("kind", "a servo needs a known kind", known_names());
+  ScenarioServo servo{table.text("name").value_or(*kind_name), default_config(*kind, scenario)};
+  read_parameters(table, servo.config);
+  if (const auto error = validate(servo.config)) table.fail_here(std::string(describe(*error)));
+  table.finish();
+  return servo;
+}
+
+/// Standard deviation of a link's noise, as the linear bound takes it.
+double jitter_sigma_ns(const sim::LinkSpec& link) {
+  struct Sigma {
+    double operator()(const sim::NoJitter&) const { return 0.0; }
+    double operator()(const sim::GaussianJitter& j) const { return j.sigma_ns; }
+    double operator()(const sim::ExponentialJitter& j) const { return j.mean_ns; }
+    double operator()(const sim::GammaJitter& j) const { return j.scale_ns * std::sqrt(j.shape); }
+    double operator()(const sim::BimodalJitter& j) const {
+      const double spread = j.extra_ns * std::sqrt(j.probability * (1.0 - j.probability));
+      return std::hypot(j.sigma_ns, spread);
+    }
+  };
+  return std::visit(Sigma{}, link.jitter);
+}
+
+baseline::KalmanNoise true_noise(const Scenario& scenario) {
+  const sim::NodeSpec& node = scenario.world.nodes.front();
+  // A tick is a uniform error, tick / sqrt(12), of each of the two stamps of a message.
+  const double ticks =
+      std::hypot(node.tick.ns(), scenario.world.reference_tick.ns()) / std::sqrt(12.0);
+  const double stamps = std::hypot(node.stamp_noise_ns, ticks);
+  // A filter needs some noise: a picosecond is below what a timestamp can hold.
+  constexpr double kLeastNoiseNs = 1e-3;
+  baseline::KalmanNoise noise;
+  noise.forward_ns = std::max(std::hypot(jitter_sigma_ns(node.forward), stamps), kLeastNoiseNs);
+  noise.backward_ns = std::max(std::hypot(jitter_sigma_ns(node.backward), stamps), kLeastNoiseNs);
+  noise.white_fm_1s = 0.0;
+  noise.random_walk_fm_1s = 0.0;
+  for (const auto& part : node.oscillator.parts) {
+    if (const auto* white = std::get_if<sim::WhiteFm>(&part)) {
+      noise.white_fm_1s = std::hypot(noise.white_fm_1s, white->adev_1s);
+    }
+    if (const auto* walk = std::get_if<sim::RandomWalkFm>(&part)) {
+      noise.random_walk_fm_1s = std::hypot(noise.random_walk_fm_1s, walk->step_1s);
+    }
+  }
+  return noise;
+}
+
+void add_bound(TomlTable& root, Scenario& scenario) {
+  ScenarioServo bound{std::string(kBoundName), default_config(ServoKind::kKalman, scenario)};
+  bound.config.kalman.noise = true_noise(scenario);
+  if (auto table = root.table("bound")) {
+    const bool wanted = table->boolean("enabled").value_or(true);
+    read_kalman_noise(*table, bound.config.kalman.noise);
+    table->finish();
+    if (!wanted) return;
+  }
+  scenario.servos.push_back(std::move(bound));
+}
+
+}  // namespace
+
+StepPolicy read_step_policy(TomlTable& clock) {
+  StepPolicy policy;
+  const auto mode = clock.word("step", {"never", "first", "always"}).value_or("never");
+  if (mode == "first") policy.mode = StepMode::kFirst;
+  if (mode == "always") policy.mode = StepMode::kAlways;
+  if (const auto v = clock.duration("step_threshold", kNotNegative)) {
+    policy.threshold = Nanoseconds{v->rounded_ns()};
+  }
+  return policy;
+}
+
+void read_servos(TomlTable& root, Scenario& scenario) {
+  auto names = root.texts("servos");
+  auto own = root.tables("servo");
+  if (names.empty() && own.empty()) names = all_servos();
+  for (const auto& name : names) {
+    auto servo = named_servo(name, scenario);
+    if (!servo) root.fail("servos", fmt::format("unknown servo \"{}\"", name), known_names());
+    scenario.servos.push_back(std::move(*servo));
+  }
+  for (auto& table : own) scenario.servos.push_back(read_servo(std::move(table), scenario));
+  add_bound(root, scenario);
+}
+
+}  // namespace ftcs::experiment

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/experiment/scenario_world.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "ftcs/experiment/number_file.h"
+
+namespace ftcs::experiment {
+namespace {
+
+constexpr Range kPositive{1e-9, 1e18};
+constexpr Range kNotNegative{0.0, 1e18};
+constexpr Range kAny{-1e18, 1e18};
+constexpr Range kFrequency{-0.5, 0.5};
+constexpr Range kAmount{0.0, 0.5};
+constexpr Range kProbability{0.0, 1.0};
+
+void read_steps_of_frequency(TomlTable& table, std::vector<sim::FrequencyPart>& parts) {
+  for (auto& step : table.tables("frequency_step")) {
+    const auto at = step.duration("at", kNotNegative);
+    const auto size = step.ratio("size", kFrequency);
+    if (!at || !size) step.fail_here("a frequency step needs at and size");
+    parts.emplace_back(sim::FrequencyStep{at->seconds(), *size});
+    step.finish();
+  }
+}
+
+void read_periodic(TomlTable& table, std::vector<sim::FrequencyPart>& parts) {
+  if (auto sine = table.table("sine")) {
+    sim::FrequencySine part;
+    part.amplitude = sine->ratio("amplitude", kAmount).value_or(0.0);
+    part.period_seconds =
+        sine->duration("period", kPositive).value_or(Nanoseconds{1'000'000'000}).seconds();
+    part.random_phase = sine->boolean("random_phase").value_or(true);
+    parts.emplace_back(part);
+    sine->finish();
+  }
+  if (auto square = table.table("square")) {
+    sim::FrequencySquare part;
+    part.amplitude = square->ratio("amplitude", kAmount).value_or(0.0);
+    part.half_period_seconds =
+        square->duration("half_period", kPositive).value_or(Nanoseconds{1'000'000'000}).seconds();
+    part.random_phase = square->boolean("random_phase").value_or(true);
+    parts.emplace_back(part);
+    square->finish();
+  }
+  if (auto ramp = table.table("ramp")) {
+    sim::FrequencyRamp part;
+    part.from_seconds = ramp->duration("from", kNotNegative).value_or(Duration{}).seconds();
+    part.to_seconds =
+        ramp->duration("to", kPositive).value_or(Nanoseconds{1'000'000'000}).seconds();
+    part.deviation = ramp->ratio("size", kFrequency).value_or(0.0);
+    if (part.to_seconds <= part.from_seconds) ramp->fail("to", "a ramp must end after it began");
+    parts.emplace_back(part);
+    ramp->finish();
+  }
+}
+
+void read_replay(TomlTable& table, std::vector<sim::FrequencyPart>& parts) {
+  auto replay = table.table("replay");
+  if (!replay) return;
+  const auto file = replay->text("file");
+  const auto interval = replay->duration("interval", kPositive);
+  const auto kind = replay->word("kind", {"phase", "frequency"});
+  if (!file || !interval || !kind) replay->fail_here("a replay needs file, interval and kind");
+  auto values = read_number_file(replay->beside(*file));
+  if (values.size() < 2) replay->fail("file", "a replay needs at least two values");
+  if (*kind == "phase") {
+    parts.emplace_back(sim::replay_phase(values, interval->seconds()));
+  } else {
+    parts.emplace_back(sim::ReplayedFrequency{
+        interval->seconds(), std::make_shared<const std::vector<double>>(std::move(values))});
+  }
+  replay->finish();
+}
+
+sim::Jitter read_jitter(TomlTable jitter) {
+  const auto kind = jitter.word("kind", {"none", "gaussian", "exponential", "gamma", "bimodal"});
+  if (!kind) jitter.fail_here("jitter needs a kind");
+  const auto ns = [&](std::string_view key) {
+    const auto value = jitter.duration(key, kNotNegative);
+    if (!value) jitter.fail_here("jitter of this kind needs " + std::string(key));
+    return value->ns();
+  };
+  sim::Jitter result;
+  if (*kind == "gaussian") result = sim::GaussianJitter{ns("sigma")};
+  if (*kind == "exponential") result = sim::ExponentialJitter{ns("mean")};
+  if (*kind == "gamma") {
+    const double shape = jitter.number("shape", {1e-3, 1e6}).value_or(1.0);
+    result = sim::GammaJitter{shape, ns("scale")};
+  }
+  if (*kind == "bimodal") {
+    const double probability = jitter.ratio("probability", kProbability).value_or(0.5);
+    const double extra = ns("extra");
+    result = sim::BimodalJitter{probability, extra, ns("sigma")};
+  }
+  jitter.finish();
+  return result;
+}
+
+void read_load(TomlTable& table, sim::LinkSpec& link) {
+  if (auto load = table.table("load")) {
+    sim::QueueingLoad queue;
+    queue.utilisation = load->ratio("utilisation", {0.0, 0.99}).value_or(0.0);
+    queue.service_ns = load->duration("service", kPositive).value_or(Nanoseconds{12'000}).ns();
+    link.queueing = queue;
+    load->finish();
+  }
+  if (auto bursts = table.table("bursts")) {
+    sim::BurstyLoad burst;
+    burst.mean_idle_s =
+        bursts->duration("mean_idle", kPositive).value_or(Nanoseconds{1'000'000'000}).seconds();
+    burst.mean_busy_s =
+        bursts->duration("mean_busy", kPositive).value_or(Nanoseconds{100'000'000}).seconds();
+    burst.extra_mean_ns = bursts->duration("extra", kNotNegative).value_or(Duration{}).ns();
+    link.bursts = burst;
+    bursts->finish();
+  }
+  if (auto spikes = table.table("spikes")) {
+    link.spikes.probability = spikes->ratio("probability", kProbability).value_or(0.0);
+    link.spikes.extra_ns = spikes->duration("extra", kAny).value_or(Duration{}).ns();
+    spikes->finish();
+  }
+}
+
+void read_mishaps(TomlTable& table, sim::LinkSpec& link) {
+  if (const auto v = table.ratio("loss", kProbability)) link.loss = *v;
+  if (const auto v = table.ratio("duplication", kProbability)) link.duplication = *v;
+  if (const auto v = table.ratio("reordering", kProbability)) link.reordering = *v;
+  if (const auto v = table.duration("reordering_hold", kNotNegative)) link.reordering_hold = *v;
+  if (const auto v = table.boolean("in_order")) link.in_order = *v;
+  for (auto& step : table.tables("step")) {
+    const auto at = step.duration("at", kNotNegative);
+    const auto extra = step.duration("extra", kAny);
+    if (!at || !extra) step.fail_here("a step of the delay needs at and extra");
+    link.delay_steps.push_back({*at, *extra});
+    step.finish();
+  }
+  for (auto& outage : table.tables("outage")) {
+    const auto from = outage.duration("from", kNotNegative);
+    const auto to = outage.duration("to", kNotNegative);
+    if (!from || !to || *to <= *from) outage.fail_here("an outage needs from and a later to");
+    link.outages.push_back({*from, *to});
+    outage.finish();
+  }
+}
+
+void read_link(TomlTable& table, sim::LinkSpec& link) {
+  if (const auto v = table.duration("delay", kNotNegative)) link.delay = *v;
+  if (auto jitter = table.table("jitter")) link.jitter = read_jitter(std::move(*jitter));
+  read_load(table, link);
+  read_mishaps(table, link);
+}
+
+}  // namespace
+
+void read_clock(TomlTable& table, sim::NodeSpec& node) {
+  auto& parts = node.oscillator.parts;
+  if (const auto v = table.duration("initial_offset", kAny)) node.initial_offset = *v;
+  if (const auto v = table.ratio("skew", kFrequency)) parts.emplace_back(sim::ConstantSkew{*v});
+  if (const auto v = table.ratio_per_second("ageing")) parts.emplace_back(sim::Ageing{*v});
+  if (const auto v = table.ratio("white_fm", kAmount)) parts.emplace_back(sim::WhiteFm{*v});
+  if (const auto v = table.ratio("flicker_fm", kAmount)) parts.emplace_back(sim::FlickerFm{*v});
+  if (const auto v = table.ratio_per_root_second("random_walk_fm"))
+    parts.emplace_back(sim::RandomWalkFm{*v});
+  read_steps_of_frequency(table, parts);
+  read_periodic(table, parts);
+  read_replay(table, parts);
+  if (const auto v = table.duration("tick", kNotNegative)) node.tick = *v;
+  if (const auto v = table.duration("stamp_noise", kNotNegative)) node.stamp_noise_ns = v->ns();
+  if (const auto v = table.duration("grid", kPositive)) node.oscillator.grid = *v;
+  const double limit = table.ratio("rate_limit", {1e-9, 0.99}).value_or(0.03);
+  node.limits = {Rate::from_ratio(1.0 - limit), Rate::from_ratio(1.0 + limit)};
+}
+
+void read_path(TomlTable& table, sim::NodeSpec& node) {
+  sim::LinkSpec both;
+  read_link(table, both);
+  node.forward = both;
+  node.backward = both;
+  if (const auto v = table.duration("asymmetry", kAny)) {
+    // delayAsymmetry, IEEE 1588-2019, 7.4.2: positive when reference to local is slower.
+    node.forward.delay = both.delay + *v;
+    node.backward.delay = both.delay - *v;
+  }
+  if (auto forward = table.table("forward")) {
+    read_link(*forward, node.forward);
+    forward->finish();
+  }
+  if (auto backward = table.table("backward")) {
+    read_link(*backward, node.backward);
+    backward->finish();
+  }
+}
+
+}  // namespace ftcs::experiment
