@@ -7,9 +7,9 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/output.h"
 #include "ftcs/record/series_reader.h"
 #include "ftcs/report/record_report.h"
-#include "ftcs/report/write_file.h"
 
 namespace ftcs::app {
 namespace {
@@ -29,17 +29,6 @@ struct AnalyseOptions {
 RecordKind kind_named(const std::string& word) {
   if (word == "frequency") return RecordKind::kFrequency;
   return word == "offset" ? RecordKind::kOffset : RecordKind::kPhase;
-}
-
-/// Writes one result file, if it was asked for. False: it failed, and standard error says why.
-bool write_result(const std::string& path, const std::string& content) {
-  if (path.empty()) return true;
-  if (path == "-") return std::fwrite(content.data(), 1, content.size(), stdout) == content.size();
-  if (const auto error = write_file(path, content)) {
-    fmt::print(stderr, "ftcs: {}\n", error->message);
-    return false;
-  }
-  return true;
 }
 
 int analyse(AnalyseOptions options) {

@@ -18,7 +18,10 @@ enum ExitCode : int {
 /// Each adds one subcommand; when it is the one that was given, it runs and leaves its code in
 /// `exit_code`.
 void add_analyse_command(CLI::App& app, int& exit_code);
+void add_compare_command(CLI::App& app, int& exit_code);
 void add_demo_command(CLI::App& app, int& exit_code);
+void add_paper_command(CLI::App& app, int& exit_code);
 void add_ptp_command(CLI::App& app, int& exit_code);
+void add_simulate_command(CLI::App& app, int& exit_code);
 
 }  // namespace ftcs::app

@@ -17,7 +17,10 @@ int run(int argc, char** argv) {
   int exit_code = kSuccess;
   add_analyse_command(app, exit_code);
   add_demo_command(app, exit_code);
+  add_compare_command(app, exit_code);
+  add_paper_command(app, exit_code);
   add_ptp_command(app, exit_code);
+  add_simulate_command(app, exit_code);
   const auto is_command = [&app](const std::string& name) {
     return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })
                 .empty();

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/experiment_files.h"
+#include "apps/ftcs/interrupt.h"
+#include "apps/ftcs/output.h"
+#include "apps/ftcs/progress.h"
+#include "ftcs/report/paper_report.h"
+
+namespace ftcs::app {
+namespace {
+
+struct PaperOptions {
+  std::string section = "4";
+  std::string folder = "paper";
+  std::uint64_t seeds = 0;
+  unsigned threads = 0;
+  std::string json;
+  std::string csv;
+  std::string html;
+  bool quiet = false;
+};
+
+/// Fewer would not carry the tolerances (1.5 % of an ensemble).
+constexpr std::uint64_t kFewestSeeds = 256;
+
+std::vector<experiment::PaperTable> load_tables(const PaperOptions& options) {
+  std::vector<experiment::PaperTable> tables;
+  for (const ExperimentFile& file : find_experiments(options.folder).files) {
+    experiment::PaperTable table = experiment::parse_paper_table(file.text, file.path);
+    if (options.seeds != 0) table.seeds = options.seeds;
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+int reproduce(const PaperOptions& options) {
+  const Interrupt interrupt;
+  std::vector<experiment::PaperResult> results;
+  if (!options.quiet) fmt::print("{}\n", algorithm_text());
+  for (const auto& table : load_tables(options)) {
+    if (interrupt.flag()) break;
+    Progress progress;
+    experiment::JobControl control;
+    control.threads = options.threads;
+    control.stop = &interrupt.flag();
+    control.progress = [&](std::size_t done, std::size_t total) { progress.show(done, total); };
+    results.push_back(experiment::run_paper_table(table, control));
+    if (!options.quiet) fmt::print("{}\n", paper_console(results.back()));
+  }
+  const bool passed = !interrupt.flag() && std::all_of(results.begin(), results.end(),
+                                                       [](const auto& r) { return r.passed(); });
+  if (interrupt.flag())
+    fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
+  fmt::print("{}\n",
+             passed ? "Every demanded tolerance holds." : "A demanded tolerance does not hold.");
+  bool written =
+      options.json.empty() || write_result(options.json, dump(paper_json(results, FTCS_VERSION)));
+  written &= options.csv.empty() || write_result(options.csv, paper_csv(results).to_csv());
+  written &= options.html.empty() || write_result(options.html, paper_html(results, FTCS_VERSION));
+  return written && passed ? kSuccess : kRuntimeError;
+}
+
+}  // namespace
+
+void add_paper_command(CLI::App& app, int& exit_code) {
+  auto options = std::make_shared<PaperOptions>();
+  CLI::App* command =
+      app.add_subcommand("paper", "Regenerate the tables and figures of Chen et al. 2017");
+  command->add_option("--section", options->section, "section of the paper: 4 (simulations)")
+      ->check(CLI::IsMember({"4"}));
+  command->add_option("--experiments", options->folder,
+                      "folder of the table files (default: built in)");
+  command->add_option("--seeds", options->seeds, "runs of each row (default: in the files)")
+      ->check(CLI::Range(kFewestSeeds, std::uint64_t{1'000'000}));
+  command->add_option("--threads", options->threads, "0 = one for each core");
+  command->add_option("--json", options->json,
+                      "write all figures to this file; - = standard output");
+  command->add_option("--csv", options->csv, "write the tables to this file");
+  command->add_option("--html", options->html, "write a report with plots to this file");
+  command->add_flag("-q,--quiet", options->quiet, "print the verdict alone");
+  command->callback([options, &exit_code] { exit_code = reproduce(*options); });
+}
+
+}  // namespace ftcs::app

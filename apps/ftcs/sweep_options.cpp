@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/sweep_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/interrupt.h"
+#include "apps/ftcs/output.h"
+#include "apps/ftcs/progress.h"
+#include "ftcs/experiment/toml_table.h"
+#include "ftcs/report/sweep_report.h"
+
+namespace ftcs::app {
+namespace {
+
+using experiment::Scenario;
+using experiment::SweepResult;
+
+/// "2/8": the second of eight parts.
+experiment::Shard parse_shard(const std::string& text) {
+  if (text.empty()) return {};
+  const auto slash = text.find('/');
+  std::size_t index = 0;
+  std::size_t count = 0;
+  const char* middle = text.data() + (slash == std::string::npos ? 0 : slash);
+  const char* end = text.data() + text.size();
+  const bool read = slash != std::string::npos &&
+                    std::from_chars(text.data(), middle, index).ptr == middle &&
+                    std::from_chars(middle + 1, end, count).ptr == end;
+  if (!read || index < 1 || index > count) {
+    throw std::runtime_error(fmt::format("--shard needs i/n with 1 <= i <= n, got {}", text));
+  }
+  return {index - 1, count};
+}
+
+void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
+  for (Scenario& scenario : scenarios) {
+    if (options.seeds != 0) scenario.seeds = options.seeds;
+    if (options.first_seed != 0) scenario.first_seed = options.first_seed;
+    if (!options.servos.empty()) {
+      std::erase_if(scenario.servos, [&](const experiment::ScenarioServo& servo) {
+        return std::find(options.servos.begin(), options.servos.end(), servo.name) ==
+                   options.servos.end() &&
+               servo.name != experiment::kBoundName;
+      });
+    }
+    if (!options.medians_only) continue;
+    for (auto& limit : scenario.limits) {
+      for (auto& figure : limit.figures)
+        figure.worst = figure.within = experiment::FigureLimit::kNoLimit;
+    }
+  }
+}
+
+SweepResult merge(const std::vector<Scenario>& scenarios, const std::vector<std::string>& files) {
+  std::vector<SweepResult> parts;
+  for (const std::string& file : files) {
+    try {
+      parts.push_back(sweep_from_json(Json::parse(experiment::read_text_file(file)), scenarios));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(
+          fmt::format("{}: not a result of --shard on these scenarios: {}", file, error.what()));
+    }
+  }
+  return experiment::merge_sweeps(scenarios, parts);
+}
+
+void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
+  for (std::size_t i = 0; i < scenarios.size(); ++i) {
+    const Scenario& scenario = scenarios[i];
+    fmt::print(
+        "{}: {}\n{} seeds from {} on, median over seeds; true time error over the measurement "
+        "window\n\n{}\n",
+        scenario.name, scenario.title, scenario.seeds, scenario.first_seed,
+        ranking_table(sweep.scenarios[i]).to_text());
+    for (const auto& note : scenario.notes) fmt::print("{}\n", note);
+    fmt::print("\n");
+  }
+  for (const auto& line : missed_limits(sweep)) fmt::print("MISSED {}\n", line);
+}
+
+/// The first seed of a single scenario, drawn; a suite has too many lines for one picture.
+std::vector<experiment::RunTrace> traces_of(const std::vector<Scenario>& scenarios) {
+  std::vector<experiment::RunTrace> traces;
+  if (scenarios.size() != 1) return traces;
+  for (const auto& servo : scenarios.front().servos) {
+    traces.emplace_back();
+    (void)experiment::run_scenario(scenarios.front(), servo, scenarios.front().first_seed,
+                                   &traces.back());
+  }
+  return traces;
+}
+
+}  // namespace
+
+void add_sweep_options(CLI::App& command, SweepOptions& options) {
+  command.add_option("--seeds", options.seeds, "runs of each servo (default: in the file)")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--first-seed", options.first_seed, "(default: in the file)");
+  command.add_option("--servo", options.servos, "only these servos (and the bound)");
+  command.add_flag("--medians-only", options.medians_only,
+                   "do not judge worst seeds and shares (for fresh seeds)");
+  command.add_option("--threads", options.threads, "0 = one for each core");
+  command.add_option("--shard", options.shard, "i/n: compute one of n parts; needs --json");
+  command.add_option("--merge", options.merge,
+                     "join the --json files of all shards instead of computing");
+  command.add_option("--json", options.json, "write all figures to this file; - = standard output");
+  command.add_option("--csv", options.csv, "write the table to this file");
+  command.add_option("--html", options.html, "write a report to this file");
+  command.add_flag("-q,--quiet", options.quiet, "print nothing to the console");
+}
+
+int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
+                   const SweepOptions& options) {
+  apply(options, scenarios);
+  const experiment::Shard shard = parse_shard(options.shard);
+  const Interrupt interrupt;
+  SweepResult sweep;
+  if (!options.merge.empty()) {
+    sweep = merge(scenarios, options.merge);
+  } else {
+    Progress progress;
+    experiment::JobControl control;
+    control.threads = options.threads;
+    control.stop = &interrupt.flag();
+    control.progress = [&](std::size_t done, std::size_t total) { progress.show(done, total); };
+    sweep = experiment::run_sweep(scenarios, shard, control);
+  }
+  if (interrupt.flag())
+    fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
+  if (!options.quiet) print(scenarios, sweep);
+  const SweepOrigin origin{source, FTCS_VERSION};
+  bool written =
+      options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));
+  written &= options.csv.empty() || write_result(options.csv, suite_table(sweep).to_csv());
+  written &= options.html.empty() ||
+             write_result(options.html, sweep_html(sweep, origin, traces_of(scenarios)));
+  const bool judged = shard.count == 1;
+  return written && !interrupt.flag() && (!judged || sweep.passed()) ? kSuccess : kRuntimeError;
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ftcs/experiment/scenario_run.h"
+
+namespace CLI {
+class App;
+}
+
+namespace ftcs::app {
+
+/// What `simulate` and `compare` have in common.
+struct SweepOptions {
+  std::uint64_t seeds = 0;          ///< 0: as the file says
+  std::uint64_t first_seed = 0;     ///< 0: as the file says
+  std::vector<std::string> servos;  ///< empty: as the file says
+  bool medians_only = false;        ///< worst-seed limits belong to the file's own seeds
+  unsigned threads = 0;
+  std::string shard;
+  std::vector<std::string> merge;
+  std::string json;
+  std::string csv;
+  std::string html;
+  bool quiet = false;
+};
+
+void add_sweep_options(CLI::App& command, SweepOptions& options);
+
+/// Runs, prints and writes; the exit code.
+[[nodiscard]] int run_and_report(std::vector<experiment::Scenario> scenarios,
+                                 const std::string& source, const SweepOptions& options);
+
+}  // namespace ftcs::app

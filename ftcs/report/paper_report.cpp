@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/report/paper_report.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "ftcs/report/html_report.h"
+#include "ftcs/report/number_format.h"
+
+namespace ftcs {
+namespace {
+
+using experiment::PaperCheckResult;
+using experiment::PaperResult;
+using experiment::PaperRow;
+using experiment::PaperRowResult;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+/// The interval on one side only is "at least" or "at most".
+std::string demand_text(const PaperCheckResult& check) {
+  if (std::isnan(check.least) && std::isnan(check.most)) {
+    return std::isnan(check.expected) ? "" : fmt::format("about {}", significant(check.expected));
+  }
+  if (std::isnan(check.most)) return fmt::format(">= {}", significant(check.least));
+  if (std::isnan(check.least)) return fmt::format("<= {}", significant(check.most));
+  if (check.least == check.most) return fmt::format("= {}", significant(check.least));
+  return fmt::format("{} .. {}", significant(check.least), significant(check.most));
+}
+
+std::string verdict(const PaperCheckResult& check) {
+  if (!check.demanded) return "report";
+  return check.passed ? "ok" : "FAILED";
+}
+
+/// A row's own verdict: every demand that speaks of it alone.
+bool row_passed(const PaperResult& result, const PaperRow& row) {
+  for (const auto& check : result.checks) {
+    if (check.subject == row.key() && !check.passed) return false;
+  }
+  return true;
+}
+
+Json row_json(const PaperResult& result, std::size_t i) {
+  const PaperRow& row = result.table.rows[i];
+  const PaperRowResult& figures = result.rows[i];
+  return Json{{"row", row.key()},
+              {"paper_rms_ns", number(row.paper_rms_ns)},
+              {"rms_perceived_offset_ns", number(figures.rms_perceived_ns)},
+              {"median_rms_ns", number(figures.median_rms_ns)},
+              {"rms_time_error_ns", number(figures.rms_true_ns)},
+              {"predicted_rms_ns", number(figures.predicted_rms_ns)},
+              {"paper_cycles", number(row.paper_cycles)},
+              {"cycles_to_converge", number(figures.median_cycles)},
+              {"passed", row_passed(result, row)},
+              {"note", row.note},
+              {"model_rms_ns", number(row.model_rms_ns)},
+              {"deviation_ns", number(figures.deviation_ns)},
+              {"percentile_5_ns", number(figures.percentile_5_ns)},
+              {"percentile_95_ns", number(figures.percentile_95_ns)},
+              {"cycles_percentile_5", number(figures.percentile_5_cycles)},
+              {"cycles_percentile_95", number(figures.percentile_95_cycles)},
+              {"cycles_from_first_message", number(figures.median_cycles_from_first_message)},
+              {"published_seed_rms_ns", number(figures.published.rms_perceived_ns)},
+              {"runs", figures.runs.size()}};
+}
+
+Json check_json(const PaperResult& result, const PaperCheckResult& check) {
+  return Json{{"table", result.table.table},
+              {"name", check.name},
+              {"subject", check.subject},
+              {"against", check.against},
+              {"expected", number(check.expected)},
+              {"least", number(check.least)},
+              {"most", number(check.most)},
+              {"measured", number(check.measured)},
+              {"demanded", check.demanded},
+              {"passed", check.passed},
+              {"note", check.note}};
+}
+
+Plot figure_plot(const PaperResult& result) {
+  Plot plot;
+  plot.title = fmt::format("{}: perceived offset, seed {}", result.table.figure,
+                           result.table.published_seed);
+  plot.x_label = "cycle";
+  plot.y_label = "local minus reference / ns";
+  for (const auto& trace : result.traces) {
+    plot.series.push_back(trace_series(trace.row, trace.perceived_offset_ns, 1.0, 1.0));
+  }
+  return plot;
+}
+
+}  // namespace
+
+std::string algorithm_text() {
+  return "Table 1: the modified FTCS, as it runs (offset = local - reference, T_offset = -offset)\n"
+         "\n"
+         "  at sample n:\n"
+         "    k(n) a_l  = reference elapsed / free running elapsed                       (12), "
+         "(13)\n"
+         "    inside    = |T_offset| < B_enter for `dwell` samples; until |T_offset| >= B_leave\n"
+         "    p(n)      = inside ? p : 1                                                 (19) : "
+         "(18)\n"
+         "    a_l(n+1)  = (1 + p(n) T_offset / T_c) k(n) a_l  for T_c, then k(n) a_l     (17)\n"
+         "    a_l(n+1)  limited to F; T_c = T_sync unless it is set shorter\n"
+         "  The first command comes with the second sample; the clock is never stepped.\n";
+}
+
+Table paper_table(const PaperResult& result) {
+  Table table({"row", "paper / ns", "ours / ns", "ratio", "median", "5 %", "95 %", "true / ns",
+               "closed form", "cycles: paper", "ours"});
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    const PaperRow& row = result.table.rows[i];
+    const PaperRowResult& f = result.rows[i];
+    table.add_row(
+        {row.key(), Cell::significant(row.paper_rms_ns, 5), Cell::significant(f.rms_perceived_ns),
+         Cell::fixed(f.rms_perceived_ns / row.paper_rms_ns, 3), Cell::significant(f.median_rms_ns),
+         Cell::significant(f.percentile_5_ns), Cell::significant(f.percentile_95_ns),
+         Cell::significant(f.rms_true_ns), Cell::significant(f.predicted_rms_ns),
+         Cell::significant(row.paper_cycles, 3),
+         std::isinf(f.median_cycles) ? Cell("never") : Cell::significant(f.median_cycles, 3)});
+  }
+  return table;
+}
+
+Table paper_checks(const PaperResult& result) {
+  Table table({"check", "row", "against", "demanded", "measured", ""});
+  for (const auto& check : result.checks) {
+    table.add_row({check.name, check.subject, check.against, demand_text(check),
+                   Cell::significant(check.measured, 5), verdict(check)});
+  }
+  return table;
+}
+
+Table paper_choices(const PaperResult& result) {
+  Table table({"the paper does not say", "chosen", "because"});
+  for (const auto& choice : result.table.choices)
+    table.add_row({choice.parameter, choice.value, choice.reason});
+  return table;
+}
+
+std::string paper_console(const PaperResult& result) {
+  const auto& table = result.table;
+  std::string text = fmt::format(
+      "{}\n{} seeds from {} on; {}\n\n", table.title, table.seeds, table.first_seed,
+      "RMS of the perceived offset (the paper's \"SSE\") over all seeds; true = time error");
+  text += paper_table(result).to_text() + "\n";
+  for (const auto& row : table.rows) {
+    if (!row.note.empty()) text += fmt::format("{}: {}\n", row.key(), row.note);
+  }
+  for (const auto& remark : table.remarks) text += remark + "\n";
+  text += "\n" + paper_choices(result).to_text() + "\n" + paper_checks(result).to_text() + "\n";
+  for (const auto& check : result.checks) {
+    if (!check.note.empty())
+      text += fmt::format("{} ({}): {}\n", check.name, check.subject, check.note);
+  }
+  return text;
+}
+
+Json paper_json(const std::vector<PaperResult>& results, const std::string& version) {
+  Json tables = Json::object();
+  Json support = Json::object();
+  Json figures = Json::object();
+  Json checks = Json::array();
+  Json choices = Json::array();
+  bool passed = true;
+  for (const PaperResult& result : results) {
+    passed = passed && result.passed();
+    Json& rows = tables[result.table.table] = Json::array();
+    Json& others = support[result.table.table] = Json::array();
+    for (std::size_t i = 0; i < result.rows.size(); ++i) {
+      (result.table.rows[i].support ? others : rows).push_back(row_json(result, i));
+    }
+    for (const auto& check : result.checks) checks.push_back(check_json(result, check));
+    for (const auto& choice : result.table.choices) {
+      choices.push_back({{"table", result.table.table},
+                         {"parameter", choice.parameter},
+                         {"value", choice.value},
+                         {"reason", choice.reason}});
+    }
+    for (const auto& trace : result.traces) {
+      figures[result.table.figure].push_back({{"row", trace.row},
+                                              {"interval_ns", trace.interval_ns},
+                                              {"seed", result.table.published_seed},
+                                              {"perceived_offset_ns", trace.perceived_offset_ns},
+                                              {"time_error_ns", trace.time_error_ns}});
+    }
+  }
+  return Json{{"program", "ftcs"},
+              {"version", version},
+              {"passed", passed},
+              {"tables", std::move(tables)},
+              {"checks", std::move(checks)},
+              {"choices", std::move(choices)},
+              {"support", std::move(support)},
+              {"figures", std::move(figures)}};
+}
+
+std::string paper_html(const std::vector<PaperResult>& results, const std::string& version) {
+  HtmlReport report("Frequency-tracking clock servo: Section IV regenerated",
+                    "Chen et al., IEEE Access 5 (2017), DOI 10.1109/ACCESS.2017.2715878");
+  for (const PaperResult& result : results) {
+    report.add_table(
+        result.table.title, paper_table(result),
+        fmt::format("{} seeds from {} on", result.table.seeds, result.table.first_seed));
+    for (const auto& remark : result.table.remarks) report.add_note(remark);
+    if (!result.traces.empty()) report.add_plot(figure_plot(result));
+    report.add_table("Choices", paper_choices(result));
+    report.add_table("Checks", paper_checks(result));
+  }
+  report.add_parameters({{"version", version}});
+  return report.render();
+}
+
+Table paper_csv(const std::vector<PaperResult>& results) {
+  Table table({"table", "row", "paper_rms_ns", "rms_perceived_offset_ns", "median_rms_ns",
+               "rms_time_error_ns", "predicted_rms_ns", "paper_cycles", "cycles_to_converge"});
+  for (const PaperResult& result : results) {
+    for (std::size_t i = 0; i < result.rows.size(); ++i) {
+      const PaperRow& row = result.table.rows[i];
+      const PaperRowResult& f = result.rows[i];
+      table.add_row({result.table.table, row.key(), Cell::significant(row.paper_rms_ns),
+                     Cell::significant(f.rms_perceived_ns), Cell::significant(f.median_rms_ns),
+                     Cell::significant(f.rms_true_ns), Cell::significant(f.predicted_rms_ns),
+                     Cell::significant(row.paper_cycles), Cell::significant(f.median_cycles)});
+    }
+  }
+  return table;
+}
+
+}  // namespace ftcs
