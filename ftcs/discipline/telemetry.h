@@ -11,7 +11,7 @@ namespace ftcs {
 
 /// Counted since construction; a new reference does not clear them.
 struct DisciplineCounters {
-  std::uint64_t used = 0;         ///< forward messages that reached the control law
+  std::uint64_t used = 0;         ///< forward messages that were not turned away
   std::uint64_t backward = 0;     ///< backward messages that were plausible
   std::uint64_t rejected = 0;     ///< outliers
   std::uint64_t duplicate = 0;    ///< repeated or late
