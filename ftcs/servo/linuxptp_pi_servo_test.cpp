@@ -239,6 +239,42 @@ TEST(LinuxptpPiServo, ignores_repetitions_and_survives_a_reference_that_goes_bac
   EXPECT_EQ(servo.update(sample_at(6.5, 0), {}).verdict, SampleVerdict::kDuplicate);
 }
 
+TEST(LinuxptpPiServo, what_is_not_used_commands_nothing) {
+  LinuxptpPiServo servo{hardware(1s)};
+  (void)servo.update(sample_at(5, 0), {});
+  EXPECT_FALSE(servo.update(sample_at(5, 0), {}).has_command);
+  SyncSample standing = sample_at(6, 0);
+  standing.origin = ReferenceTime::from_ns(5'000'000'000);
+  const ServoUpdate update = servo.update(standing, {});  // the reference stands still
+  EXPECT_EQ(update.verdict, SampleVerdict::kImplausible);
+  EXPECT_FALSE(update.has_command);
+}
+
+TEST(LinuxptpPiServo, a_configured_interval_is_not_measured) {
+  LinuxptpPiServo servo{hardware(1s)};
+  (void)servo.update(sample_at(0, 0), {});
+  (void)servo.update(sample_at(0.125, 0), {});
+  EXPECT_EQ(servo.gains().proportional, 0.7);
+  EXPECT_EQ(LinuxptpPiServo{}.gains().proportional, 0.0);  // not known yet
+  EXPECT_EQ(LinuxptpPiServo{}.gains().integral, 0.0);
+}
+
+TEST(LinuxptpPiServo, steps_at_the_start_only_beyond_the_step_threshold) {
+  LinuxptpPiConfig config = hardware(1s);
+  config.first_step_threshold = 0ns;
+  config.step_threshold = 1ms;
+  EXPECT_EQ(validate(config), std::nullopt);
+  for (const std::int64_t sign : {1, -1}) {
+    LinuxptpPiServo at_threshold{config};
+    (void)at_threshold.update(sample_at(0, sign * 1'000'000), {});
+    EXPECT_EQ(at_threshold.update(sample_at(1, sign * 1'000'000), {}).command.step, Duration{});
+    LinuxptpPiServo beyond{config};
+    (void)beyond.update(sample_at(0, sign * 1'000'001), {});
+    EXPECT_EQ(beyond.update(sample_at(1, sign * 1'000'001), {}).command.step,
+              Duration{Nanoseconds{-sign * 1'000'001}});
+  }
+}
+
 TEST(LinuxptpPiServo, allocates_nothing) {
   const test::ForbidAllocation guard;
   LinuxptpPiServo servo{};

@@ -101,6 +101,7 @@ TEST(PicsServo, ignores_repetitions_and_starts_again_after_a_jump) {
   EXPECT_EQ(rate_after(servo, 1, 0), 1.0);
   EXPECT_FALSE(servo.update(sample_at(1, 500), {}).has_command);
   EXPECT_EQ(servo.update(sample_at(1, 500), {}).verdict, SampleVerdict::kDuplicate);
+  EXPECT_FALSE(servo.update(sample_at(1, 500), {}).has_command);
   EXPECT_EQ(servo.update(sample_at(0, 500), {}).verdict, SampleVerdict::kDuplicate);
   SyncSample jump = sample_at(2, 0);
   jump.origin = jump.origin + Nanoseconds{1s};

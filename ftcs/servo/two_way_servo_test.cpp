@@ -203,6 +203,42 @@ TEST(TwoWayServo, a_transmitter_that_jumps_by_a_second_is_followed_after_the_gat
   }
 }
 
+TEST(TwoWayServo, newer_on_neither_clock_is_a_duplicate) {
+  Exchange exchange{TwoWayServo<FtcsServo>{{}, ftcs_config()}, 0ns};
+  for (int n = 0; n < 12; ++n) exchange.cycle();
+  exchange.sync();
+  const ReferenceTime reference = exchange.plant().reference() - kPath;
+  const FreeRunningTime free_running = exchange.plant().free_running();
+  const LocalTime local = exchange.plant().local();
+  const Duration before = Nanoseconds{1ms};
+  for (const TimestampPair& pair :
+       {TimestampPair{Direction::kForward, reference, local, free_running - before},
+        TimestampPair{Direction::kForward, reference - before, local, free_running},
+        TimestampPair{Direction::kForward, reference, local, free_running}}) {
+    const ServoUpdate update = exchange.feed(pair);
+    EXPECT_EQ(update.verdict, SampleVerdict::kDuplicate);
+    EXPECT_FALSE(update.has_command);
+  }
+  // Newer on one clock is no repetition, whatever else it may be.
+  const TimestampPair jumped{Direction::kForward, reference + Nanoseconds{1s}, local, free_running};
+  EXPECT_EQ(exchange.feed(jumped).verdict, SampleVerdict::kRejected);
+}
+
+TEST(TwoWayServo, clocks_may_start_before_their_epoch) {
+  TwoWayServo<FreeRunningServo> servo{{}, {}};
+  const TimestampPair pair{Direction::kForward, ReferenceTime::from_ns(-5'000),
+                           LocalTime::from_ns(-5'000), FreeRunningTime::from_ns(-5'000)};
+  EXPECT_EQ(servo.update(pair, {}).verdict, SampleVerdict::kUsed);
+}
+
+TEST(TwoWayServo, without_rate_compensation_there_is_no_prediction_and_no_gate) {
+  TwoWayConfig config;
+  config.path_delay.rate_compensated = false;
+  Exchange exchange{TwoWayServo<FtcsServo>{config, ftcs_config()}, 0ns};
+  for (int n = 0; n < 12; ++n) exchange.cycle();
+  EXPECT_TRUE(exchange.cycle(Nanoseconds{100us}).has_command);
+}
+
 TEST(TwoWayServo, reset_forgets_the_path_delay) {
   Exchange exchange{TwoWayServo<FreeRunningServo>{{}, {}}, 0ns};
   exchange.cycle();
