@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
 namespace ftcs {
 namespace {
@@ -48,33 +47,35 @@ std::optional<ServoConfigError> validate(const AdaptiveConfig& config) noexcept 
   return std::nullopt;
 }
 
-template <class Grid, std::size_t Window>
-BasicAdaptiveServo<Grid, Window>::BasicAdaptiveServo(const AdaptiveConfig& config) noexcept
-    : config_(config), estimator_(known_delay(config)), steering_(config.steering) {
+template <class Grid>
+BasicAdaptiveServo<Grid>::BasicAdaptiveServo(const AdaptiveConfig& config) noexcept
+    : sync_interval_(config.sync_interval),
+      estimator_(known_delay(config)),
+      steering_(config.steering) {
   reset();
 }
 
-template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::reset() noexcept {
+template <class Grid>
+void BasicAdaptiveServo<Grid>::reset() noexcept {
   forget();
   order_.reset();
   steering_.reset();
-  snapshot_ = ServoSnapshot{};
+  latest_ = Belief{};
+  state_ = ServoState::kUnlocked;
 }
 
 /// Everything measured is void; the clock keeps its command, and a first step stays spent.
-template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::forget() noexcept {
-  // In place: a temporary would be kilobytes on the stack.
-  std::construct_at(&estimator_, known_delay(config_));
-  meter_ = adaptive::IntervalMeter{static_cast<double>(config_.sync_interval.count())};
+template <class Grid>
+void BasicAdaptiveServo<Grid>::forget() noexcept {
+  estimator_.restart();
+  meter_ = adaptive::IntervalMeter{static_cast<double>(sync_interval_.count())};
   started_ = false;
 }
 
 /// Time passes by the reference, whose stamps do not depend on the path; unless it has jumped
 /// against the free-running clock.
-template <class Grid, std::size_t Window>
-Observation BasicAdaptiveServo<Grid, Window>::observe(const TimestampPair& pair) noexcept {
+template <class Grid>
+Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
   const double delay = std::clamp(estimator_.estimate().d, -kLongestDelayNs, kLongestDelayNs);
@@ -99,8 +100,8 @@ Observation BasicAdaptiveServo<Grid, Window>::observe(const TimestampPair& pair)
 }
 
 /// Keeps the offset states so small that a double resolves them to well below a nanosecond.
-template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::rebase() noexcept {
+template <class Grid>
+void BasicAdaptiveServo<Grid>::rebase() noexcept {
   const double x = estimator_.estimate().x;
   if (std::abs(x) < kLargestOffsetNs) return;
   const Duration shift = Duration::from_ns(x);
@@ -108,15 +109,15 @@ void BasicAdaptiveServo<Grid, Window>::rebase() noexcept {
   estimator_.shift_offset(-shift.ns());
 }
 
-template <class Grid, std::size_t Window>
-bool BasicAdaptiveServo<Grid, Window>::ready() const noexcept {
-  if (config_.fixed_path_delay.has_value()) return estimator_.count() >= 2;
+template <class Grid>
+bool BasicAdaptiveServo<Grid>::ready() const noexcept {
+  if (estimator_.known_delay().known()) return estimator_.count() >= 2;
   return estimator_.count() >= (estimator_.two_way() ? 3U : 4U);
 }
 
-template <class Grid, std::size_t Window>
-ServoUpdate BasicAdaptiveServo<Grid, Window>::update(const TimestampPair& pair,
-                                                     const ClockReading& now) noexcept {
+template <class Grid>
+ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
+                                             const ClockReading& now) noexcept {
   using Order = adaptive::MessageOrder::Verdict;
   const Order order = order_.judge(pair);
   if (order == Order::kDuplicate) return {SampleVerdict::kDuplicate, false, {}};
@@ -134,8 +135,8 @@ ServoUpdate BasicAdaptiveServo<Grid, Window>::update(const TimestampPair& pair,
 
 /// r = 1 + y: free running per reference. The estimate says that the free-running clock showed
 /// F_e = event + base + x at the event; so the reference now is event + (F_now - F_e) / r.
-template <class Grid, std::size_t Window>
-typename BasicAdaptiveServo<Grid, Window>::Belief BasicAdaptiveServo<Grid, Window>::believe(
+template <class Grid>
+typename BasicAdaptiveServo<Grid>::Belief BasicAdaptiveServo<Grid>::believe(
     const ClockReading& now) const noexcept {
   const Estimate& e = estimator_.estimate();
   Belief belief;
@@ -150,43 +151,45 @@ typename BasicAdaptiveServo<Grid, Window>::Belief BasicAdaptiveServo<Grid, Windo
   return belief;
 }
 
-template <class Grid, std::size_t Window>
-ServoUpdate BasicAdaptiveServo<Grid, Window>::steer(const ClockReading& now) noexcept {
+template <class Grid>
+ServoUpdate BasicAdaptiveServo<Grid>::steer(const ClockReading& now) noexcept {
   const Belief belief = believe(now);
   // Before the rate is known, or on nonsense: no command is better than any.
   if (!(std::abs(belief.rate_deviation) < kPlausibleDeviation)) return {};
   const adaptive::Steered steered = steering_.steer({belief.offset_ns, 1.0 + belief.rate_deviation},
                                                     kCorrectionShare * meter_.interval_ns());
-  snapshot_.state = steered.stepped ? ServoState::kJump : ServoState::kLocked;
-  publish(belief);
+  state_ = steered.stepped ? ServoState::kJump : ServoState::kLocked;
+  latest_ = belief;
   return {SampleVerdict::kUsed, true, steered.command};
 }
 
-template <class Grid, std::size_t Window>
-void BasicAdaptiveServo<Grid, Window>::publish(const Belief& belief) noexcept {
-  snapshot_.offset_known = true;
-  snapshot_.offset = Duration::from_ns(belief.offset_ns);
-  snapshot_.path_delay = Duration::from_ns(estimator_.estimate().d);
-  snapshot_.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
-  snapshot_.offset_gain = estimator_.gain();
-  snapshot_.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);
-  snapshot_.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
-  snapshot_.path_delay_sigma_ns = estimator_.delay_sigma_ns();
-  snapshot_.timestamp_noise_ns = estimator_.scale();
-}
-
-template <class Grid, std::size_t Window>
-ServoSnapshot BasicAdaptiveServo<Grid, Window>::snapshot_at(
-    const ClockReading& now) const noexcept {
-  ServoSnapshot snapshot = snapshot_;
-  if (!snapshot.offset_known) return snapshot;
-  const Belief belief = believe(now);
+template <class Grid>
+ServoSnapshot BasicAdaptiveServo<Grid>::describe(const Belief& belief,
+                                                 ServoState state) const noexcept {
+  ServoSnapshot snapshot;
+  snapshot.state = state;
+  if (state == ServoState::kUnlocked) return snapshot;
+  snapshot.offset_known = true;
   snapshot.offset = Duration::from_ns(belief.offset_ns);
+  snapshot.path_delay = Duration::from_ns(estimator_.estimate().d);
+  snapshot.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
+  snapshot.offset_gain = estimator_.gain();
   snapshot.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);
-  if (belief.cycles > kSilence) snapshot.state = ServoState::kHoldover;
+  snapshot.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
+  snapshot.path_delay_sigma_ns = estimator_.delay_sigma_ns();
+  snapshot.timestamp_noise_ns = estimator_.scale();
   return snapshot;
 }
 
-template class BasicAdaptiveServo<adaptive::FullGrid, 32>;
+template <class Grid>
+ServoSnapshot BasicAdaptiveServo<Grid>::snapshot_at(const ClockReading& now) const noexcept {
+  if (state_ == ServoState::kUnlocked) return snapshot();
+  Belief belief = believe(now);
+  belief.rate_deviation = latest_.rate_deviation;
+  return describe(belief, belief.cycles > kSilence ? ServoState::kHoldover : state_);
+}
+
+template class BasicAdaptiveServo<adaptive::FullGrid>;
+template class BasicAdaptiveServo<adaptive::SmallGrid>;
 
 }  // namespace ftcs

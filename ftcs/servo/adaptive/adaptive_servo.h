@@ -29,7 +29,7 @@ struct AdaptiveConfig {
 /// The adaptive clock servo: joint estimate of offset, rate and path delay from every timestamp
 /// pair of either direction, with noise learnt on line, and the paper's deadbeat steering on the
 /// filtered estimate. Derivation: docs/adaptive-servo.md.
-template <class Grid, std::size_t Window>
+template <class Grid>
 class BasicAdaptiveServo {
  public:
   using Config = AdaptiveConfig;
@@ -38,8 +38,8 @@ class BasicAdaptiveServo {
 
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept;
-  /// As of the last message that moved the servo.
-  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
+  /// As of the last message after which the servo steered.
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return describe(latest_, state_); }
   /// As of `now`: the offset that the clock has by the servo's belief, and how far that belief can
   /// be trusted. Without messages for a while the state is holdover and the deviation grows.
   [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;
@@ -56,10 +56,10 @@ class BasicAdaptiveServo {
   };
   [[nodiscard]] Belief believe(const ClockReading& now) const noexcept;
   [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
-  void publish(const Belief& belief) noexcept;
+  [[nodiscard]] ServoSnapshot describe(const Belief& belief, ServoState state) const noexcept;
 
-  AdaptiveConfig config_;
-  adaptive::Estimator<Grid, Window> estimator_;
+  Nanoseconds sync_interval_;
+  adaptive::Estimator<Grid> estimator_;
   adaptive::Steering steering_;
   adaptive::IntervalMeter meter_;
   adaptive::MessageOrder order_{};
@@ -67,12 +67,17 @@ class BasicAdaptiveServo {
   Duration base_{};             ///< first z: keeps the states small
   FreeRunningTime previous_{};  ///< of the last message
   ReferenceTime event_{};       ///< of the last message, reference time at the local clock
-  ServoSnapshot snapshot_{};
+  Belief latest_{};
+  ServoState state_ = ServoState::kUnlocked;
 };
 
-using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid, 32>;
+using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid>;
+/// Below 1 KiB, for microcontrollers: half a microsecond a message on a PC core.
+using SmallAdaptiveServo = BasicAdaptiveServo<adaptive::SmallGrid>;
 
-extern template class BasicAdaptiveServo<adaptive::FullGrid, 32>;
+extern template class BasicAdaptiveServo<adaptive::FullGrid>;
+extern template class BasicAdaptiveServo<adaptive::SmallGrid>;
 static_assert(ClockServo<AdaptiveServo>);
+static_assert(ClockServo<SmallAdaptiveServo>);
 
 }  // namespace ftcs

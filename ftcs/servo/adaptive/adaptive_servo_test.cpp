@@ -99,6 +99,18 @@ TEST(AdaptiveServo, one_direction_suffices_if_the_path_delay_is_known) {
   EXPECT_LE(result.rms_ns, 12.0);
 }
 
+TEST(AdaptiveServo, the_small_variant_locks_as_quickly_and_stays_below_the_noise) {
+  std::vector<double> c5, rms;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    ExchangeSimulator<SmallAdaptiveServo> simulator({}, SmallAdaptiveServo{}, seed);
+    const ExchangeResult result = simulator.run();
+    c5.push_back(result.c5_cycles);
+    rms.push_back(result.rms_ns);
+  }
+  EXPECT_LE(median(c5), 2.0);
+  EXPECT_LE(median(rms), 20.0);
+}
+
 TEST(AdaptiveServo, repeated_messages_change_nothing) {
   AdaptiveServo servo;
   TimestampPair pair;
@@ -226,6 +238,7 @@ TEST(AdaptiveServo, holdover_is_announced_and_its_bound_grows) {
 
 TEST(AdaptiveServo, neither_allocates_nor_grows) {
   static_assert(sizeof(AdaptiveServo) < 16 * 1024);
+  static_assert(sizeof(SmallAdaptiveServo) < 1024);
   AdaptiveServo servo;
   const test::ForbidAllocation guard;
   for (int i = 0; i < 100; ++i) {

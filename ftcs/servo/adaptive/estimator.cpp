@@ -33,6 +33,9 @@ constexpr double kSmallestScale = 1e-4;
 constexpr double kSmallestSquare = 1e-30;
 /// Nats; a weight of e^-40 moves nothing.
 constexpr double kHopeless = 40.0;
+/// Twice nats per place behind the starting model: with three messages every model is as likely as
+/// the next, and the wildest would take the noise for motion. Forgotten after a dozen messages.
+constexpr double kWildnessCost = 1.0;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 8;
@@ -54,19 +57,19 @@ double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
 
 }  // namespace
 
-template <class Grid, std::size_t Window>
-bool Estimator<Grid, Window>::observable() const noexcept {
+template <class Grid>
+bool Estimator<Grid>::observable() const noexcept {
   return two_way() || known_delay_.known() || count_ > kMixFrom;
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::restart() noexcept {
+template <class Grid>
+void Estimator<Grid>::restart() noexcept {
   const KnownDelay delay = known_delay_;
   std::construct_at(this, delay);
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::begin(Direction direction) noexcept {
+template <class Grid>
+void Estimator<Grid>::begin(Direction direction) noexcept {
   Estimate start;
   start.xx = kOffsetPrior;
   start.yy = kRatePrior;
@@ -82,8 +85,8 @@ void Estimator<Grid, Window>::begin(Direction direction) noexcept {
 /// With one direction only x + sign d is seen; d stays pinned to zero (no cancellation of huge
 /// covariances). The first message of the other direction sets it free:
 /// x = (x + sign d) - sign d.
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::connect_second_direction(Direction direction) noexcept {
+template <class Grid>
+void Estimator<Grid>::connect_second_direction(Direction direction) noexcept {
   const std::size_t side = index_of(direction);
   if (seen_[side]) return;
   seen_[side] = true;
@@ -96,8 +99,8 @@ void Estimator<Grid, Window>::connect_second_direction(Direction direction) noex
   });
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::rescale_time(double factor) noexcept {
+template <class Grid>
+void Estimator<Grid>::rescale_time(double factor) noexcept {
   bank_.for_each([factor](Estimate& e) {
     e.y *= factor;
     e.xy *= factor;
@@ -111,15 +114,15 @@ void Estimator<Grid, Window>::rescale_time(double factor) noexcept {
   second_opinion_.rescale_time(factor);
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::shift_offset(double shift_ns) noexcept {
+template <class Grid>
+void Estimator<Grid>::shift_offset(double shift_ns) noexcept {
   bank_.for_each([shift_ns](Estimate& e) { e.x += shift_ns; });
   mixed_.x += shift_ns;
   second_opinion_.shift_offset(shift_ns);
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::update(Direction direction, const Observation& seen) noexcept {
+template <class Grid>
+double Estimator<Grid>::update(Direction direction, const Observation& seen) noexcept {
   const std::size_t side = index_of(direction);
   const double elapsed = count_ == 0 ? 0.0 : seen.elapsed;
   if (count_ == 0) begin(direction);
@@ -128,24 +131,24 @@ double Estimator<Grid, Window>::update(Direction direction, const Observation& s
   ++since_change_;
   bank_.predict(elapsed);
   const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
-  bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
-  bank_.correct(seen, scale_);
+  const Innovations innovations =
+      bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
+  bank_.correct(seen, scale_, innovations);
   if (!bank_.healthy()) {  // absurd input, or rounding after absurd input
     restart();
     return 0.0;
   }
 
-  const typename Bank::Innovations& innovations = bank_.innovations();
   const double credit = innovations.credit[best_];
   const double innovation = innovations.centred[best_] + scale_ * shape_[side].tail;
   const double predicted = innovations.predicted[best_];
   gain_ = credit * predicted / (predicted + shape_[side].total_variance());
-  if (count_ > kEvidenceFrom && observable()) gather_evidence();
+  if (count_ > kEvidenceFrom && observable()) gather_evidence(innovations);
   if (count_ > kJudgeFrom) {
     double& late = late_outliers_[side];
     late =
         std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
-    detect_changes();
+    detect_changes(innovations.log_density);
   }
   rejected_[side] = credit < kRejected ? static_cast<std::uint8_t>(rejected_[side] + 1) : 0;
   if (rejected_[side] >= kRejectedInARow) leave_gate(side, innovation);
@@ -164,16 +167,15 @@ double Estimator<Grid, Window>::update(Direction direction, const Observation& s
       if (all_mature && taken % 16 == 0) adopt_shapes();
     }
   }
-  if (count_ > kEvidenceFrom) follow_surprise(side);
+  if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
   seek_second_opinion(seen, innovation);
   choose();
   mix();
   return credit;
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::seek_second_opinion(const Observation& seen,
-                                                  double innovation) noexcept {
+template <class Grid>
+void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innovation) noexcept {
   second_opinion_.push(seen, innovation);
   if (std::max(rejected_[0], rejected_[1]) >= kSurprises) surprise_ = 2 * kOpinionPeriod;
   const bool due = count_ <= kOpinionOften || count_ % kOpinionPeriod == 0 || surprise_ > 0;
@@ -184,8 +186,8 @@ void Estimator<Grid, Window>::seek_second_opinion(const Observation& seen,
   if (fit.better) start_again(fit);
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::start_again(const FreshFit& fit) noexcept {
+template <class Grid>
+void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   Estimate start = fit.estimate;
   scale_ = robust_scale_ = fit.scale_ns;
   if (known_delay_.known()) {
@@ -208,9 +210,8 @@ void Estimator<Grid, Window>::start_again(const FreshFit& fit) noexcept {
   count_ = kJudgeFrom;
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::gather_evidence() noexcept {
-  const typename Bank::Innovations& innovations = bank_.innovations();
+template <class Grid>
+void Estimator<Grid>::gather_evidence(const Innovations& innovations) noexcept {
   const double s2 = scale_ * scale_;
   const double log_s2 = quick_log(s2);
   for (std::size_t i = 0; i < kSize; ++i) {
@@ -223,16 +224,16 @@ void Estimator<Grid, Window>::gather_evidence() noexcept {
   weight_sum_ += innovations.credit[best_];
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::forget_evidence() noexcept {
+template <class Grid>
+void Estimator<Grid>::forget_evidence() noexcept {
   weight_sum_ = 0.0;
   squares_.fill(0.0);
   logs_.fill(0.0);
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::detect_changes() noexcept {
-  detector_.add(bank_.innovations().log_density);
+template <class Grid>
+void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
+  detector_.add(log_density);
   std::array<std::size_t, kCalm> source{};
   bool any = false;
   for (std::size_t i = 0; i < kCalm; ++i) {
@@ -255,8 +256,8 @@ void Estimator<Grid, Window>::detect_changes() noexcept {
 }
 
 /// Ten messages of one direction in a row cannot all be outliers: the gate opens.
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::leave_gate(std::size_t side, double innovation) noexcept {
+template <class Grid>
+void Estimator<Grid>::leave_gate(std::size_t side, double innovation) noexcept {
   rejected_[side] = 0;
   const double doubt = innovation * innovation / (scale_ * scale_);
   const bool delay_free = two_way() && !known_delay_.known();
@@ -267,8 +268,8 @@ void Estimator<Grid, Window>::leave_gate(std::size_t side, double innovation) no
 }
 
 /// c_i = W ln(V_i / W) + L_i: minus twice the log-likelihood with the scale profiled out.
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::choose() noexcept {
+template <class Grid>
+void Estimator<Grid>::choose() noexcept {
   if (count_ <= kMixFrom || weight_sum_ <= 0.0) {
     weight_.fill(0.0);
     best_ = Grid::kStart;
@@ -278,8 +279,9 @@ void Estimator<Grid, Window>::choose() noexcept {
   typename Bank::Row cost{};
   const double per_message = 1.0 / weight_sum_;
   for (std::size_t i = 0; i < kSize; ++i) {
-    cost[i] =
-        weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) + logs_[i];
+    const double wildness = i > Grid::kStart ? static_cast<double>(i - Grid::kStart) : 0.0;
+    cost[i] = weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) +
+              logs_[i] + kWildnessCost * wildness;
   }
   best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
   double total = 0.0;
@@ -299,8 +301,8 @@ void Estimator<Grid, Window>::choose() noexcept {
   }
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::mix() noexcept {
+template <class Grid>
+void Estimator<Grid>::mix() noexcept {
   mixed_ = bank_.mixture(weight_, scale_);
   process_ = {};
   for (std::size_t i = 0; i < kSize; ++i) {
@@ -309,8 +311,8 @@ void Estimator<Grid, Window>::mix() noexcept {
   }
 }
 
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::follow_scale() noexcept {
+template <class Grid>
+void Estimator<Grid>::follow_scale() noexcept {
   robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
   if (weight_sum_ > 4.0 && squares_[best_] / weight_sum_ > 9.0 * robust_scale_ * robust_scale_) {
     forget_evidence();
@@ -336,8 +338,8 @@ void Estimator<Grid, Window>::follow_scale() noexcept {
 /// Brings the learnt shapes into use. When a tail appears or goes, the zero of the delay moves from
 /// the mean to the floor or back by `shift`; half of it was offset, half path delay, known to
 /// about 30 per cent.
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::adopt_shapes() noexcept {
+template <class Grid>
+void Estimator<Grid>::adopt_shapes() noexcept {
   double product = 1.0;
   int sides = 0;
   std::array<DelayShape, 2> in_ns{};
@@ -375,9 +377,8 @@ void Estimator<Grid, Window>::adopt_shapes() noexcept {
 
 /// Exponential mean of nu^2 / S of the best model. What is taken for an outlier counts as far as
 /// outliers are not what one expects on this path.
-template <class Grid, std::size_t Window>
-void Estimator<Grid, Window>::follow_surprise(std::size_t side) noexcept {
-  const typename Bank::Innovations& innovations = bank_.innovations();
+template <class Grid>
+void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
   const double centred = innovations.centred[best_];
   const double normalised =
       std::min(centred * centred / innovations.variance[best_], kSurpriseLimit);
@@ -387,22 +388,22 @@ void Estimator<Grid, Window>::follow_surprise(std::size_t side) noexcept {
   surprise_level_ += kSurpriseShare * (level - surprise_level_);
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::widening() const noexcept {
+template <class Grid>
+double Estimator<Grid>::widening() const noexcept {
   return std::max(1.0, surprise_level_ / kUsualSurprise);
 }
 
 /// Where the floor of a queueing delay lies is known to a few per cent of its tail only; equal
 /// errors of both directions cancel in the offset.
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::floor_doubt_ns() const noexcept {
+template <class Grid>
+double Estimator<Grid>::floor_doubt_ns() const noexcept {
   const double difference =
       two_way() ? (shape_[0].tail - shape_[1].tail) / 2.0 : shape_[0].tail + shape_[1].tail;
   return kFloorDoubt * scale_ * difference;
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::offset_sigma_ns(double cycles) const noexcept {
+template <class Grid>
+double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
   const double h = std::max(0.0, cycles);
   const double variance = mixed_.xx + 2.0 * h * mixed_.xy + h * h * mixed_.yy +
                           process_.white_fm * h + process_.random_walk_fm * h * h * h / 3.0;
@@ -410,21 +411,22 @@ double Estimator<Grid, Window>::offset_sigma_ns(double cycles) const noexcept {
   return std::sqrt(scale_ * scale_ * widening() * std::max(variance, 0.0) + floor * floor);
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::rate_sigma_ns() const noexcept {
+template <class Grid>
+double Estimator<Grid>::rate_sigma_ns() const noexcept {
   return scale_ * std::sqrt(widening() * mixed_.yy);
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::delay_sigma_ns() const noexcept {
+template <class Grid>
+double Estimator<Grid>::delay_sigma_ns() const noexcept {
   return std::sqrt(scale_ * scale_ * widening() * mixed_.dd + floor_doubt_ns() * floor_doubt_ns());
 }
 
-template <class Grid, std::size_t Window>
-double Estimator<Grid, Window>::noise_ns(Direction direction) const noexcept {
+template <class Grid>
+double Estimator<Grid>::noise_ns(Direction direction) const noexcept {
   return scale_ * std::sqrt(shape_[index_of(direction)].total_variance());
 }
 
-template class Estimator<FullGrid, 32>;
+template class Estimator<FullGrid>;
+template class Estimator<SmallGrid>;
 
 }  // namespace ftcs::adaptive

@@ -24,10 +24,11 @@ struct KnownDelay {
 
 /// Joint estimate of offset, rate and path delay of the free-running clock against the reference:
 /// the bank, its evidence, what is learnt about noise, and the detection of changes.
-template <class Grid, std::size_t Window>
+template <class Grid>
 class Estimator {
  public:
   explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
+  /// Forgets everything but the known delay, in place: a temporary would be kilobytes of stack.
   void restart() noexcept;
 
   /// Returns the probability that the message is no outlier.
@@ -45,6 +46,7 @@ class Estimator {
   [[nodiscard]] double delay_sigma_ns() const noexcept;
   /// Noise of one timestamp of the given direction, ns.
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
+  [[nodiscard]] const KnownDelay& known_delay() const noexcept { return known_delay_; }
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
   /// Gain of the last raw innovation on the offset: the effective p.
@@ -56,13 +58,15 @@ class Estimator {
 
  private:
   using Bank = ModelBank<Grid>;
+  using Row = typename Bank::Row;
+  using Innovations = typename Bank::Innovations;
   static constexpr std::size_t kSize = Grid::kSize;
   static constexpr std::size_t kCalm = kSize - Grid::kJumps;
 
   void begin(Direction direction) noexcept;
   void connect_second_direction(Direction direction) noexcept;
-  void gather_evidence() noexcept;
-  void detect_changes() noexcept;
+  void gather_evidence(const Innovations& innovations) noexcept;
+  void detect_changes(const Row& log_density) noexcept;
   void leave_gate(std::size_t side, double innovation) noexcept;
   void choose() noexcept;
   void mix() noexcept;
@@ -73,20 +77,20 @@ class Estimator {
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
-  void follow_surprise(std::size_t side) noexcept;
+  void follow_surprise(std::size_t side, const Innovations& innovations) noexcept;
   [[nodiscard]] double widening() const noexcept;
   [[nodiscard]] double floor_doubt_ns() const noexcept;
 
   KnownDelay known_delay_{};
   Bank bank_{};
   ChangeDetector<Grid> detector_{};
-  std::array<NoiseLearner<Window>, 2> learner_{};
+  std::array<NoiseLearner<Grid::kNoiseWindow>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};
   std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};
   std::array<bool, 2> seen_{};
   std::array<std::uint8_t, 2> rejected_{};
-  SortedWindow<Window> residuals_{};
-  SecondOpinion<Window / 2> second_opinion_{};
+  SortedWindow<Grid::kResidualWindow> residuals_{};
+  SecondOpinion<Grid::kOpinionWindow> second_opinion_{};
 
   typename Bank::Row squares_{};  ///< V: credited normalised squares, ns^2
   typename Bank::Row logs_{};     ///< L: credited ln of normalised variance

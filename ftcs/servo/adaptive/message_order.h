@@ -17,8 +17,10 @@ class MessageOrder {
  public:
   enum class Verdict : std::uint8_t { kNews, kDuplicate, kImplausible, kNewEpoch };
 
-  [[nodiscard]] Verdict judge(const TimestampPair& pair) noexcept {
-    Side& side = sides_[index_of(pair.direction)];
+  [[nodiscard]] Verdict judge(const TimestampPair& message) noexcept {
+    const Stamps pair{message.reference.since_epoch().floor_ns(),
+                      message.free_running.since_epoch().floor_ns()};
+    Side& side = sides_[index_of(message.direction)];
     if (!side.seen || newer(pair, side.latest)) {
       side = {pair, pair, true, 0};
       return Verdict::kNews;
@@ -42,9 +44,14 @@ class MessageOrder {
   void reset() noexcept { sides_ = {}; }
 
  private:
+  /// Whole nanoseconds suffice to tell two messages apart.
+  struct Stamps {
+    std::int64_t reference = 0;
+    std::int64_t free_running = 0;
+  };
   struct Side {
-    TimestampPair latest{};     ///< newest message taken
-    TimestampPair candidate{};  ///< newest message refused since
+    Stamps latest{};     ///< newest message taken
+    Stamps candidate{};  ///< newest message refused since
     bool seen = false;
     std::uint8_t refused = 0;
   };
@@ -54,10 +61,10 @@ class MessageOrder {
   [[nodiscard]] static std::size_t index_of(Direction direction) noexcept {
     return direction == Direction::kForward ? 0 : 1;
   }
-  [[nodiscard]] static bool newer(const TimestampPair& a, const TimestampPair& b) noexcept {
+  [[nodiscard]] static bool newer(const Stamps& a, const Stamps& b) noexcept {
     return a.reference > b.reference && a.free_running > b.free_running;
   }
-  [[nodiscard]] static bool same(const TimestampPair& a, const TimestampPair& b) noexcept {
+  [[nodiscard]] static bool same(const Stamps& a, const Stamps& b) noexcept {
     return a.reference == b.reference && a.free_running == b.free_running;
   }
 

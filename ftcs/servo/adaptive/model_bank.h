@@ -87,11 +87,11 @@ class ModelBank {
   }
 
   /// Judges one observation; without `gate` nothing is taken for an outlier.
-  void judge(const Observation& seen, const DelayShape& shape, double scale,
-             const OutlierPrior& outliers, bool gate) noexcept {
+  [[nodiscard]] Innovations judge(const Observation& seen, const DelayShape& shape, double scale,
+                                  const OutlierPrior& outliers, bool gate) const noexcept {
     const double s2 = scale * scale;
     const double tail = scale * shape.tail;
-    Innovations& out = innovations_;
+    Innovations out;
     bool suspicious = false;
     for (std::size_t i = 0; i < kSize; ++i) {
       const double predicted = xx_[i] + 2.0 * seen.sign * xd_[i] + dd_[i];
@@ -111,18 +111,19 @@ class ModelBank {
       out.log_density[i] = -0.5 * (distance + out.log_variance[i] + kLn2Pi);
       suspicious |= distance > kSuspicious;
     }
-    if (tail > 0.0) judge_late(s2 * shape.variance, s2, tail);
-    if (gate && suspicious) doubt(outliers);
+    if (tail > 0.0) judge_late(s2 * shape.variance, s2, tail, out);
+    if (gate && suspicious) doubt(outliers, out);
+    return out;
   }
 
-  void correct(const Observation& seen, double scale) noexcept {
+  void correct(const Observation& seen, double scale, const Innovations& innovations) noexcept {
     const double s2 = scale * scale;
     for (std::size_t i = 0; i < kSize; ++i) {
       const double hx = xx_[i] + seen.sign * xd_[i];
       const double hy = xy_[i] + seen.sign * yd_[i];
       const double hd = xd_[i] + seen.sign * dd_[i];
-      const double move = seen.sign * innovations_.slope[i] * s2;
-      const double shrink = innovations_.curvature[i] * s2;
+      const double move = seen.sign * innovations.slope[i] * s2;
+      const double shrink = innovations.curvature[i] * s2;
       x_[i] += hx * move;
       y_[i] += hy * move;
       d_[i] += hd * move;
@@ -135,7 +136,6 @@ class ModelBank {
     }
   }
 
-  [[nodiscard]] const Innovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] Estimate estimate(std::size_t i) const noexcept {
     return {x_[i], y_[i], d_[i], xx_[i], xy_[i], xd_[i], yy_[i], yd_[i], dd_[i]};
   }
@@ -207,19 +207,18 @@ class ModelBank {
   static constexpr double kLn2Pi = 1.8378770664093453;
 
   /// Queueing noise: slope, curvature and density of the late shape.
-  void judge_late(double noise, double s2, double tail) noexcept {
+  static void judge_late(double noise, double s2, double tail, Innovations& out) noexcept {
     for (std::size_t i = 0; i < kSize; ++i) {
-      const double spread = s2 * innovations_.predicted[i] + noise;
-      const Score score = late_score(innovations_.centred[i] + tail, spread, tail);
-      innovations_.slope[i] = score.slope;
-      innovations_.curvature[i] = score.curvature;
-      innovations_.log_density[i] = score.log_density;
+      const double spread = s2 * out.predicted[i] + noise;
+      const Score score = late_score(out.centred[i] + tail, spread, tail);
+      out.slope[i] = score.slope;
+      out.curvature[i] = score.curvature;
+      out.log_density[i] = score.log_density;
     }
   }
 
   /// The outlier hypothesis: density probability / (10 |centred|), broad and scale-free.
-  void doubt(const OutlierPrior& outliers) noexcept {
-    Innovations& out = innovations_;
+  static void doubt(const OutlierPrior& outliers, Innovations& out) noexcept {
     for (std::size_t i = 0; i < kSize; ++i) {
       const double centred = out.centred[i];
       if (centred * centred <= kSuspicious * out.variance[i]) continue;
@@ -234,7 +233,6 @@ class ModelBank {
     }
   }
 
-  Innovations innovations_{};
   Row x_{}, y_{}, d_{}, xx_{}, xy_{}, xd_{}, yy_{}, yd_{}, dd_{};
 };
 

@@ -76,6 +76,5 @@ DelayShape NoiseLearner<Window>::decide() noexcept {
 }
 
 template class NoiseLearner<32>;
-template class NoiseLearner<8>;
 
 }  // namespace ftcs::adaptive

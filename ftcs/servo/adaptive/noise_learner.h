@@ -53,7 +53,19 @@ class NoiseLearner {
   bool has_tail_ = false;
 };
 
+/// Learns nothing: both directions have normal noise of one common scale.
+template <>
+class NoiseLearner<0> {
+ public:
+  bool learn(const NoiseSample&, const DelayShape&) noexcept { return false; }
+  void restart() noexcept {}
+  void move_mean(double) noexcept {}
+  [[nodiscard]] bool mature() const noexcept { return false; }
+  [[nodiscard]] double count() const noexcept { return 0.0; }
+  [[nodiscard]] double variance() const noexcept { return 1.0; }
+  [[nodiscard]] DelayShape decide() noexcept { return {}; }
+};
+
 extern template class NoiseLearner<32>;
-extern template class NoiseLearner<8>;
 
 }  // namespace ftcs::adaptive

@@ -19,6 +19,9 @@ struct NoiseModel {
 /// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
 /// a^(1/2). The last three are jumps: of the offset by some and by many sigma, of the path delay.
 struct FullGrid {
+  static constexpr std::size_t kResidualWindow = 32;  ///< innovations behind the robust scale
+  static constexpr std::size_t kNoiseWindow = 32;     ///< of the noise learner, per direction
+  static constexpr std::size_t kOpinionWindow = 16;   ///< messages of the second opinion
   static constexpr std::size_t kSize = 32;
   static constexpr std::size_t kJumps = 3;
   static constexpr std::size_t kStart = 13;  ///< the model that is believed before any evidence
@@ -31,6 +34,22 @@ struct FullGrid {
       {1e-1, 1e-4, 0.0}, {0.0, 1e-1, 0.0},   {0.0, 1e0, 0.0},   {1e0, 1e-6, 0.0},
       {1e0, 1e-3, 0.0},  {0.0, 1e1, 0.0},    {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},
       {0.0, 1e4, 0.0},   {1e2, 0.0, 0.0},    {1e5, 0.0, 0.0},   {0.0, 0.0, 1e5},
+  }};
+};
+
+/// For microcontrollers: three models four decades apart, the gate and the detection of changes,
+/// but neither learnt noise shapes nor a second opinion. What that costs: docs/adaptive-servo.md.
+struct SmallGrid {
+  static constexpr std::size_t kResidualWindow = 8;
+  static constexpr std::size_t kNoiseWindow = 0;
+  static constexpr std::size_t kOpinionWindow = 0;
+  static constexpr std::size_t kSize = 3;
+  static constexpr std::size_t kJumps = 0;
+  static constexpr std::size_t kStart = 1;
+  static constexpr std::array<NoiseModel, kSize> kModels = {{
+      {0.0, 1e-9, 0.0},
+      {0.0, 1e-4, 0.0},
+      {0.0, 1e1, 0.0},
   }};
 };
 

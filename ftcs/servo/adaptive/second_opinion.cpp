@@ -263,6 +263,5 @@ FreshFit SecondOpinion<Capacity>::consult(bool delay_free, double known_delay) c
 }
 
 template class SecondOpinion<16>;
-template class SecondOpinion<6>;
 
 }  // namespace ftcs::adaptive

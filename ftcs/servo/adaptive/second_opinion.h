@@ -68,7 +68,17 @@ class SecondOpinion {
   double time_ = 0.0;
 };
 
+/// Never asked.
+template <>
+class SecondOpinion<0> {
+ public:
+  void push(const Observation&, double) noexcept {}
+  [[nodiscard]] FreshFit consult(bool, double) const noexcept { return {}; }
+  void adopt(const Estimate&) noexcept {}
+  void rescale_time(double) noexcept {}
+  void shift_offset(double) noexcept {}
+};
+
 extern template class SecondOpinion<16>;
-extern template class SecondOpinion<6>;
 
 }  // namespace ftcs::adaptive

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// World: log densities per message; index 0 is the calmest model, the last three are jumps.
+#include "ftcs/servo/adaptive/change_detector.h"
+
+#include <array>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace ftcs::adaptive {
+namespace {
+
+using Detector = ChangeDetector<FullGrid>;
+using Densities = std::array<double, Detector::kSize>;
+constexpr double kLater = 1000.0;  // messages seen: the threshold is at its final value
+
+TEST(ChangeDetector, a_wilder_model_that_explains_more_takes_over) {
+  Detector detector;
+  Densities l{};
+  l[20] = 4.0;
+  for (int i = 0; i < 2; ++i) {
+    detector.add(l);
+    EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+  }
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater), 20U);
+  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone) << "sums start anew";
+}
+
+TEST(ChangeDetector, a_calmer_model_never_takes_over) {
+  Detector detector;
+  Densities l{};
+  l[2] = 50.0;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+}
+
+TEST(ChangeDetector, a_jump_that_leads_but_is_not_certain_holds_the_others_back) {
+  Detector detector;
+  Densities l{};
+  l[20] = 13.0;
+  l[30] = 25.0;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+  l[20] = 0.0;
+  l[30] = 10.0;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater), 30U);
+}
+
+TEST(ChangeDetector, evidence_must_come_in_a_row) {
+  Detector detector;
+  Densities good{};
+  Densities bad{};
+  good[20] = 6.0;
+  bad[20] = -6.0;
+  for (int i = 0; i < 100; ++i) {
+    detector.add(good);
+    detector.add(bad);
+    ASSERT_EQ(detector.take_over(5, kLater), Detector::kNone);
+  }
+}
+
+TEST(ChangeDetector, early_on_it_asks_for_more) {
+  Detector detector;
+  Densities l{};
+  l[20] = 20.0;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, 8.0), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater), 20U);
+}
+
+/// Two models with the same mean and variances 1 and 1.2, data from the first: exp(11) messages
+/// between false alarms is Wald's bound.
+TEST(ChangeDetector, false_alarms_are_rare) {
+  Detector detector;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  int alarms = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const double n = normal(random);
+    Densities l;
+    l.fill(-0.5 * n * n);
+    l[20] = -0.5 * n * n / 1.2 - 0.5 * 0.1823;
+    detector.add(l);
+    if (detector.take_over(0, kLater) != Detector::kNone) ++alarms;
+  }
+  EXPECT_LE(alarms, 2);
+}
+
+}  // namespace
+}  // namespace ftcs::adaptive
