@@ -67,6 +67,9 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (const auto due = deadline()) until = std::min(until, *due);
   transport_.wait_until(oscillator_.to_underlying(until));
   if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
+  for (const std::uint16_t id : std::exchange(unsent_, {})) {
+    perform(on_sent(id, std::nullopt, now()));
+  }
   report_stamps();
   housekeeping(now());
 }
@@ -114,9 +117,7 @@ void PtpPort::send(const ptp::SendMessage& message) {
                                      answer ? sender_ : std::optional<in_addr>{});
   if (error && !send_failed_) log_(LogLevel::kWarning, "{}", error->message());
   send_failed_ = error.has_value();  // one line for a series of failures
-  if (error && message.channel == ptp::Channel::kEvent) {
-    perform(on_sent(message.sequence_id, std::nullopt, now()));
-  }
+  if (error && message.channel == ptp::Channel::kEvent) unsent_.push_back(message.sequence_id);
 }
 
 void PtpPort::on_message(const platform::ReceivedMessage& message) {

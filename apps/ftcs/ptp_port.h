@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
@@ -80,6 +81,7 @@ class PtpPort : private platform::TransportHandler {
   std::optional<in_addr> sender_{};  ///< of the message that is being handled
   std::optional<platform::StampSource> reported_stamps_{};
   bool send_failed_ = false;
+  std::vector<std::uint16_t> unsent_{};  ///< event messages that the network did not take
   std::optional<std::string> failure_{};
 };
 
