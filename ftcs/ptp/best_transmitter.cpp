@@ -41,11 +41,13 @@ const ForeignTransmitters::Record* ForeignTransmitters::find(
 }
 
 ForeignTransmitters::Record* ForeignTransmitters::place_for(const PortIdentity& port,
+                                                            const PortIdentity& selected,
                                                             FreeRunningTime now) noexcept {
   Record* free_place = nullptr;
   for (Record& record : records_) {
     if (record.used && record.data.port == port) return &record;
     const bool silent =
+        record.data.port != selected &&
         now - record.last > multiply(record.announce_interval, kTimeWindowIntervals);
     if (free_place == nullptr && (!record.used || silent)) free_place = &record;
   }
@@ -55,8 +57,9 @@ ForeignTransmitters::Record* ForeignTransmitters::place_for(const PortIdentity& 
 
 ForeignTransmitters::Heard ForeignTransmitters::hear(const TransmitterData& data,
                                                      Duration announce_interval,
-                                                     FreeRunningTime now) noexcept {
-  Record* const record = place_for(data.port, now);
+                                                     FreeRunningTime now,
+                                                     const PortIdentity& selected) noexcept {
+  Record* const record = place_for(data.port, selected, now);
   if (record == nullptr) return Heard::kTableFull;
   const bool known = record->used;
   *record = Record{.used = true,

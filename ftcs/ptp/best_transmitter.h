@@ -26,9 +26,10 @@ class ForeignTransmitters {
 
   enum class Heard : std::uint8_t { kNew, kKnown, kTableFull };
 
-  /// An Announce arrived. A full table gives the place of a transmitter that has fallen silent to a
-  /// newcomer.
-  Heard hear(const TransmitterData& data, Duration announce_interval, FreeRunningTime now) noexcept;
+  /// An Announce arrived. A newcomer may take the place of a transmitter that has fallen silent,
+  /// but not that of `selected`: when its silence ends it is for the receipt timeout to say.
+  Heard hear(const TransmitterData& data, Duration announce_interval, FreeRunningTime now,
+             const PortIdentity& selected = {}) noexcept;
 
   /// The best of the qualified ones and of `selected`, which needs no further qualification while
   /// it is in the table; null if there is none. Valid until the next change.
@@ -53,7 +54,8 @@ class ForeignTransmitters {
   };
   [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now) noexcept;
   [[nodiscard]] const Record* find(const PortIdentity& port) const noexcept;
-  [[nodiscard]] Record* place_for(const PortIdentity& port, FreeRunningTime now) noexcept;
+  [[nodiscard]] Record* place_for(const PortIdentity& port, const PortIdentity& selected,
+                                  FreeRunningTime now) noexcept;
 
   std::array<Record, kCapacity> records_{};
 };

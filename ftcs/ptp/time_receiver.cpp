@@ -213,7 +213,8 @@ void TimeReceiver::on_announce(const Header& header, const Announce& announce, F
   }
   TransmitterData data{header.source, announce, header.flags};
   data.announce.origin = {};  // differs in each message and says nothing about the transmitter
-  const auto heard = foreign_.hear(data, interval.value_or(Duration{std::chrono::seconds{1}}), now);
+  const auto heard = foreign_.hear(data, interval.value_or(Duration{std::chrono::seconds{1}}), now,
+                                   has_transmitter_ ? transmitter_.port : PortIdentity{});
   if (heard == ForeignTransmitters::Heard::kTableFull) counters_.add(Counter::kForeignTableFull);
   if (heard == ForeignTransmitters::Heard::kNew) push(TransmitterSeen{header.source}, actions);
   decide(now, actions);

@@ -125,6 +125,24 @@ TEST_F(Receiver, a_flood_of_identities_does_not_push_the_selected_one_out) {
   EXPECT_EQ(count(Counter::kForeignTableFull), 998U - 7U);
 }
 
+class PatientReceiver : public Receiver {
+ protected:
+  static TimeReceiverConfig patient() {
+    TimeReceiverConfig config = default_config();
+    config.announce_receipt_timeout = 10;
+    return config;
+  }
+  PatientReceiver() : Receiver(patient()) {}
+};
+
+TEST_F(PatientReceiver, a_newcomer_does_not_take_the_place_of_a_silent_one_that_still_has_time) {
+  select_a();
+  static_cast<void>(general(announce_from(kB), 6s));  // A: silent for longer than it qualifies
+  EXPECT_EQ(receiver_.deadline(), local(10250ms));
+  static_cast<void>(receiver_.on_timer(local(10250ms)));
+  EXPECT_EQ(receiver_.transmitter(), nullptr) << "A is given up all the same";
+}
+
 TEST_F(Receiver, an_announce_interval_out_of_range_counts_as_the_configured_one) {
   Message announce = announce_from(kA);
   announce.header.log_interval = 100;
