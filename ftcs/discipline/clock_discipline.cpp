@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/discipline/clock_discipline.h"
 
+#include <algorithm>
+
 namespace ftcs {
 namespace {
 
@@ -49,6 +51,7 @@ void ClockDiscipline::on_new_reference() noexcept {
   servo_.reset();
   lock_.reset();
   has_sample_ = false;
+  last_gap_ = Duration{};
   in_holdover_ = false;
   ++counters_.new_references;
   telemetry_.servo = servo_.snapshot();
@@ -88,7 +91,9 @@ void ClockDiscipline::count(Direction direction, SampleVerdict verdict) noexcept
 
 void ClockDiscipline::note_sample(const EventPair& pair) noexcept {
   if (has_sample_ && config_.servo.sync_interval == Nanoseconds{0}) {
-    sync_interval_ = pair.reference - last_sample_.reference;
+    const Duration gap = pair.reference - last_sample_.reference;
+    sync_interval_ = last_gap_ > Duration{} ? std::min(gap, last_gap_) : gap;
+    last_gap_ = gap;
   }
   last_sample_ = pair;
   has_sample_ = true;

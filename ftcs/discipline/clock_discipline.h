@@ -65,7 +65,9 @@ class ClockDiscipline {
   bool in_holdover_ = false;
   bool has_sample_ = false;
   EventPair last_sample_{};
-  Duration sync_interval_{};  ///< configured, or between the last two samples
+  /// Configured, or the shorter one of the last two gaps between samples: an outage is no interval.
+  Duration sync_interval_{};
+  Duration last_gap_{};
   Telemetry telemetry_{};
   DisciplineCounters counters_{};
 };

@@ -188,6 +188,31 @@ TEST_F(ClockDisciplineTest, holdover_uses_the_measured_interval_where_none_is_co
   EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
 }
 
+TEST_F(ClockDisciplineTest, an_outage_is_not_taken_for_the_interval) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.sync_interval = 0ns;
+  start(Duration{}, config);
+  for (int n = 0; n < 8; ++n) sync_and_wait();
+  advance(Nanoseconds{100s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+  EXPECT_NE(sync().servo.state, ServoState::kHoldover);  // a single message, and silence again
+  advance(Nanoseconds{1s});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+  EXPECT_FALSE(discipline_->locked());
+}
+
+TEST_F(ClockDisciplineTest, a_longer_interval_is_learnt_from_two_gaps) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.sync_interval = 0ns;
+  start(Duration{}, config);
+  for (int n = 0; n < 8; ++n) sync_and_wait();
+  for (int n = 0; n < 3; ++n) {
+    sync();
+    advance(Nanoseconds{1s});
+  }
+  EXPECT_NE(discipline_->on_silence().servo.state, ServoState::kHoldover);
+}
+
 TEST_F(ClockDisciplineTest, a_new_reference_starts_the_servo_again_and_keeps_the_rate) {
   reference_rate_ = Rate::from_ppm(40.0);
   start(Nanoseconds{10us}, config_for(ServoKind::kFtcs));
