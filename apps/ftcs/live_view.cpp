@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <string_view>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -26,6 +28,22 @@ std::string_view state_name(const Telemetry& telemetry) {
       return "holdover";
   }
   return "";
+}
+
+std::size_t terminal_columns() {
+  constexpr std::size_t kUsual = 80;
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kUsual;
+  return size.ws_col;
+}
+
+/// A line that the terminal does not wrap: wrapped ones would not be found again by the next
+/// picture. `rest(room)` fills what `text`, which is ASCII, leaves.
+template <class Rest>
+std::string line(std::string text, std::size_t columns, const Rest& rest) {
+  const std::size_t room = columns - 1;  // a full last column wraps on some terminals
+  text.resize(std::min(text.size(), room));
+  return "\x1b[2K" + text + rest(room - text.size()) + "\n";
 }
 
 }  // namespace
@@ -56,19 +74,25 @@ std::string format_time(double ns) {
 void LiveView::draw(std::span<const ServoTrial* const> trials, double elapsed_seconds,
                     double total_seconds) {
   if (!enabled_) return;
+  const std::size_t columns = terminal_columns();
   std::string screen;
   if (drawn_lines_ > 0) screen += fmt::format("\x1b[{}A", drawn_lines_);
-  screen += fmt::format(
-      "\x1b[2K{:5.1f} of {:.0f} s   true offset     offset it sees        rate   state     "
-      "|true offset|, 10 ns to 1 ms\n",
-      elapsed_seconds, total_seconds);
+  screen += line(fmt::format("{:>13}  {:>13}  {:>13}  {:>14}  {:<8} ",
+                             fmt::format("{:.1f} of {:.0f} s", elapsed_seconds, total_seconds),
+                             "true offset", "offset it sees", "rate", "state"),
+                 columns, [](std::size_t room) {
+                   return std::string("|true offset|, 10 ns to 1 ms").substr(0, room);
+                 });
   for (const ServoTrial* trial : trials) {
     const Telemetry& latest = trial->latest();
     const auto& truth = trial->true_offsets_ns();
-    screen += fmt::format("\x1b[2K{:>13}  {:>13}  {:>13}  {:>10.3f} ppm  {:<8} {}\n", trial->name(),
-                          truth.empty() ? "" : format_time(truth.back()),
-                          format_time(latest.servo.offset.ns()), latest.applied_rate.ppm(),
-                          state_name(latest), offset_plot(truth, kPlotWidth));
+    screen += line(fmt::format("{:>13}  {:>13}  {:>13}  {:>10.3f} ppm  {:<8} ", trial->name(),
+                               truth.empty() ? "" : format_time(truth.back()),
+                               format_time(latest.servo.offset.ns()), latest.applied_rate.ppm(),
+                               state_name(latest)),
+                   columns, [&truth](std::size_t room) {
+                     return offset_plot(truth, std::min(room, kPlotWidth));
+                   });
   }
   drawn_lines_ = trials.size() + 1;
   std::fputs(screen.c_str(), stdout);
