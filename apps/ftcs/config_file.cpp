@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 
 #include <fmt/core.h>
 
@@ -70,9 +70,11 @@ std::optional<std::string> read_config_text(std::string_view text, std::string_v
 
 std::optional<std::string> read_config_file(const std::string& path, PtpOptions& options) {
   std::ifstream file(path);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) return fmt::format("{}: {}", path, std::strerror(errno));
-  return read_config_text(text, path, options);
+  std::ostringstream text;
+  // A folder can be opened, but not read.
+  if (!file || (file.peek(), file.bad())) return fmt::format("{}: {}", path, std::strerror(errno));
+  if (!file.eof()) text << file.rdbuf();
+  return read_config_text(text.str(), path, options);
 }
 
 }  // namespace ftcs::app

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <arpa/inet.h>
 #include <unistd.h>
 #include <utility>
 
@@ -7,6 +8,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/demo.h"
+#include "apps/ftcs/number_check.h"
 #include "apps/ftcs/ptp_transmitter.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/report/write_file.h"
@@ -14,11 +16,33 @@
 namespace ftcs::app {
 namespace {
 
+/// The two processes share their ports with each other, so that the system would let a third one
+/// in: two demonstrations on one port hear each other. Whoever asks for a port alone is refused.
+std::optional<platform::OsError> port_in_use(platform::Kernel& kernel, std::uint16_t event_port) {
+  for (const int port : {int{event_port}, event_port + 1}) {
+    const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+    if (fd < 0) return platform::os_error(-fd, "socket");
+    const platform::Descriptor socket(kernel, fd);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    const int result = kernel.bind(fd, address);
+    if (result < 0) return platform::os_error(-result, fmt::format("UDP port {}", port));
+  }
+  return std::nullopt;
+}
+
 /// Ports of this process alone, below the range of ephemeral ports; no rights needed.
-std::uint16_t default_event_port() {
+std::uint16_t default_event_port(platform::Kernel& kernel) {
   constexpr int kFirst = 20000;
   constexpr int kPairs = 5000;
-  return static_cast<std::uint16_t>(kFirst + 2 * (getpid() % kPairs));
+  constexpr int kAttempts = 100;  // all of them taken: let the last one be the error
+  std::uint16_t port = 0;
+  for (int i = 0; i < kAttempts; ++i) {
+    port = static_cast<std::uint16_t>(kFirst + 2 * ((getpid() + i) % kPairs));
+    if (!port_in_use(kernel, port)) break;
+  }
+  return port;
 }
 
 ptp::ClockIdentity identity(std::uint8_t last) {
@@ -26,11 +50,11 @@ ptp::ClockIdentity identity(std::uint8_t last) {
   return ptp::ClockIdentity::from_mac({0x02, 0x46, 0x54, 0x43, 0x53, last});
 }
 
-PtpOptions port_options(const DemoOptions& demo) {
+PtpOptions port_options(platform::Kernel& kernel, const DemoOptions& demo) {
   PtpOptions options;
   options.interface = "lo";
   options.socket.interface = "lo";
-  options.socket.event_port = demo.event_port != 0 ? demo.event_port : default_event_port();
+  options.socket.event_port = demo.event_port != 0 ? demo.event_port : default_event_port(kernel);
   options.socket.general_port = static_cast<std::uint16_t>(options.socket.event_port + 1);
   options.log_sync_interval = demo.log_sync_interval;
   options.log_min_delay_req_interval = demo.log_sync_interval;
@@ -48,6 +72,9 @@ std::optional<platform::OsError> open(platform::Kernel& kernel, const PtpOptions
 }
 
 int run_transmitter(PtpOptions options) {
+  // Ctrl-C at a terminal goes to a process group: only the receiver must hear it, which then ends
+  // us; otherwise it would find its transmitter dead and call that an error.
+  (void)setpgid(0, 0);
   platform::LinuxKernel kernel;
   Log log(kernel, stderr, options.log_level);
   options.role = Role::kTimeTransmitter;
@@ -90,7 +117,11 @@ std::optional<std::string> complete(DemoArguments& arguments) {
 
 int run_demo(const DemoOptions& demo, const std::string& json_file) {
   platform::LinuxKernel kernel;
-  PtpOptions options = port_options(demo);
+  PtpOptions options = port_options(kernel, demo);
+  if (const auto error = port_in_use(kernel, options.socket.event_port)) {
+    fmt::print(stderr, "ftcs demo: {}\n", error->message());
+    return kRuntimeError;
+  }
   Log log(kernel, stderr, options.log_level);
   std::unique_ptr<platform::TimestampClock> clock;
   if (const auto error = open(kernel, options, clock)) {
@@ -129,7 +160,7 @@ void add_demo_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<DemoArguments>();
   DemoOptions& options = arguments->options;
   command->add_option("--duration", options.duration_s, "seconds; default 20")
-      ->check(CLI::Range(3.0, 86400.0));
+      ->check(number_from(3, 86'400));
   command->add_option("--json", arguments->json_file, "write the figures to this file")
       ->type_name("FILE");
   command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms");
@@ -137,11 +168,11 @@ void add_demo_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("--logSyncInterval", options.log_sync_interval,
                    "log2 of seconds; default -3 (125 ms)")
-      ->check(CLI::Range(-7, 0));
+      ->check(integer_from(-7, 0));
   command
       ->add_option("--event-port", options.event_port,
                    "UDP port, and the next one for general messages")
-      ->check(CLI::Range(1024, 65534));
+      ->check(integer_from(1024, 65'534));
   command->add_flag("!--no-live", options.live_view, "no live view on the terminal");
   command->callback([arguments, &exit_code] {
     if (const auto wrong = complete(*arguments)) {

@@ -120,9 +120,13 @@ void DemoReceiver::housekeeping(FreeRunningTime) {
 int DemoReceiver::finish() {
   view_.finish();
   if (one_way_ns_.empty()) {
-    log()(LogLevel::kError, "no Sync message arrived on {} within {} s", options().interface,
-          demo_.duration_s);
+    log()(LogLevel::kError, "no Sync message arrived on {} within {:.1f} s", options().interface,
+          seconds_since_start());
     return kRuntimeError;
+  }
+  if (seconds_since_start() < demo_.duration_s) {
+    log()(LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
+          seconds_since_start(), demo_.duration_s);
   }
   return kSuccess;
 }

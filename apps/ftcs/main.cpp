@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cstdio>
 #include <exception>
 #include <string>
 
@@ -44,7 +45,11 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    const int exit_code = run(argc, argv);
+    // What was printed may still lie in a buffer: a full disk shows only here.
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+    fmt::print(stderr, "ftcs: cannot write to standard output\n");
+    return ftcs::app::kRuntimeError;
   } catch (const std::exception& error) {
     fmt::print(stderr, "ftcs: {}\n", error.what());
     return ftcs::app::kRuntimeError;

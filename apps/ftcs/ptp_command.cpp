@@ -9,6 +9,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
+#include "apps/ftcs/number_check.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_port.h"
 #include "apps/ftcs/units.h"
@@ -216,11 +217,14 @@ void add_own_flags(CLI::App& command, PtpArguments& arguments) {
   command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
       ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
   command.add_option("--servo", arguments.servo, servo_names() + "; default ftcs");
-  command.add_option("--offset-gain", arguments.offset_gain, "ftcs: p inside the band, 0 to 1");
+  command.add_option("--offset-gain", arguments.offset_gain,
+                     "ftcs: p inside the band, 0 to 1; default 1/16");
   command.add_option("--converged-band", arguments.converged_band,
                      "ftcs: B, as ENTER[:LEAVE], for example 1us:5us");
-  command.add_option("--converged-dwell", arguments.converged_dwell,
-                     "ftcs: samples inside the band before p applies");
+  command
+      .add_option("--converged-dwell", arguments.converged_dwell,
+                  "ftcs: samples inside the band before p applies; default 4")
+      ->check(integer_from(0, 1'000'000'000));
   command.add_option("--correction-time", arguments.correction_time,
                      "ftcs: T_c, in which an offset is removed; default: the Sync interval");
   command.add_option("--max-frequency", arguments.max_frequency,
@@ -233,11 +237,13 @@ void add_own_flags(CLI::App& command, PtpArguments& arguments) {
   command.add_flag("--first-step", arguments.first_step, "allow one step at the start");
   auto* json = command.add_flag("--json", arguments.json, "one JSON object a sample");
   command.add_flag("--csv", arguments.csv, "one CSV line a sample")->excludes(json);
-  command.add_option("--event-port", arguments.event_port, "UDP port; default 319");
-  command.add_option("--general-port", arguments.general_port, "UDP port; default 320");
+  command.add_option("--event-port", arguments.event_port, "UDP port; default 319")
+      ->check(integer_from(1, 65'535));
+  command.add_option("--general-port", arguments.general_port, "UDP port; default 320")
+      ->check(integer_from(1, 65'535));
   command.add_option("--unicast", arguments.unicast, "IPv4 address of the only peer");
   command.add_option("--duration", arguments.duration_s, "stop after so many seconds")
-      ->check(CLI::Range(0.001, 1e9));
+      ->check(number_from(0.001, 1e9));
 }
 
 }  // namespace

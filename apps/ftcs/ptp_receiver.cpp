@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "apps/ftcs/ptp_receiver.h"
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <utility>
 #include <variant>
 
@@ -153,7 +155,9 @@ void PtpReceiver::report(const SampleRecord& record) {
       fmt::print("{}\n", csv_line(record));
       break;
   }
-  std::fflush(stdout);
+  if (options().output != Output::kText && std::fflush(stdout) != 0) {
+    return fail(fmt::format("standard output: {}", std::strerror(errno)));
+  }
   if (!record.offset_known) return;
   if (record.telemetry.locked && record.telemetry.verdict == SampleVerdict::kUsed) {
     since_lock_.add(record);

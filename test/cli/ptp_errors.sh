@@ -53,6 +53,13 @@ expect 2 "'L2' is not supported, only UDPv4" ptp -i lo --network_transport L2
 expect 2 "excludes" ptp -i lo -H -S
 expect 2 "$folder/none.conf: No such file" ptp -f "$folder/none.conf"
 
+expect 2 "$folder: Is a directory" ptp -i lo -f "$folder"
+expect 2 "--duration: 'nan': expected a number" ptp -i lo --duration nan
+expect 2 "--event-port: '0': expected an integer" ptp -i lo --event-port 0
+expect 2 "--general-port: '65536': expected an integer" ptp -i lo --general-port 65536
+expect 2 "--duration: 'nan': expected a number from 3 to 86400" demo --duration nan
+expect 2 "--logSyncInterval: '1': expected an integer from -7 to 0" demo --logSyncInterval 1
+
 config "[global]" "domainNumber 0" "colour blue"
 expect 2 "ptp.conf:3: unknown setting 'colour'" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "" "# a comment" "delay_mechanism P2P"
@@ -75,6 +82,8 @@ ports=(--event-port $((20000 + $$ % 10000)) --general-port $((30000 + $$ % 10000
 holder=$!
 sleep 0.5
 expect 1 "already in use by another program" ptp -i lo "${ports[@]}" --unicast 127.0.0.1
+expect 1 "already in use by another program" demo --event-port "${ports[1]}"
+expect 1 "already in use by another program" demo --event-port $((ports[3] - 1))
 kill -TERM "$holder"
 wait "$holder"
 code=$?
@@ -83,6 +92,29 @@ if [ "$code" -ne 3 ]; then
   failures=$((failures + 1))
 fi
 holder=
+
+# What could not be written is an error, whatever was measured.
+if [ -w /dev/full ]; then
+  for arguments in "ptp --help" "ptp -i lo ${ports[*]} --duration 0.1 --csv" "demo --duration 3"; do
+    # shellcheck disable=SC2086
+    timeout 20 "$ftcs" $arguments > /dev/full 2> "$folder/err"
+    code=$?
+    if [ "$code" -ne 1 ] || ! grep -q "standard output" "$folder/err"; then
+      echo "FAILED: ftcs $arguments > /dev/full: exit code $code, expected 1:"
+      cat "$folder/err"
+      failures=$((failures + 1))
+    fi
+  done
+fi
+
+# Ctrl-C at a terminal reaches every process of a group: still a demonstration that was stopped, and not a
+# transmitter that died.
+setsid --wait timeout --signal=INT 2 "$ftcs" demo > "$folder/out" 2> "$folder/err"
+if grep -q "transmitter ended" "$folder/err" || ! grep -q "stopped after" "$folder/err" || ! grep -q "^ftcs " "$folder/out"; then
+  echo "FAILED: an interrupted demonstration says:"
+  cat "$folder/out" "$folder/err"
+  failures=$((failures + 1))
+fi
 
 # Ports below 1024 without the right to them (where nobody needs a right, there is nothing to see).
 privileged=$(cat /proc/sys/net/ipv4/ip_unprivileged_port_start 2> /dev/null || echo 1024)
