@@ -2,6 +2,7 @@
 #include "ftcs/experiment/scenario.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
@@ -26,6 +27,14 @@ Duration read_interval(TomlTable& root) {
   const auto interval = run->duration("sync_interval", {1'000.0, 1e15});
   if (!interval) run->fail_here("[run] needs sync_interval, for example \"1 s\"");
   return *interval;
+}
+
+/// PTP tells its intervals as 2^n seconds (IEEE 1588-2019, 7.7.2.1).
+void require_power_of_two(const TomlTable& root, Duration interval) {
+  const double exponent = std::log2(interval.seconds());
+  if (exponent == std::round(exponent) && std::abs(exponent) <= 7.0) return;
+  root.fail("run", "network = \"ptp\" needs a sync_interval of 2^n seconds, -7 <= n <= 7",
+            "for example \"1 s\" or \"125 ms\"");
 }
 
 void read_run(TomlTable& root, Scenario& scenario) {
@@ -141,6 +150,7 @@ Scenario read_scenario(TomlTable root, const std::string& file, const std::strin
   scenario.world.two_way = scenario.network != "one-way";
   scenario.world.interval = read_interval(root);
   root.set_cycle(scenario.world.interval);
+  if (scenario.network == "ptp") require_power_of_two(root, scenario.world.interval);
   read_run(root, scenario);
   read_world(root, scenario);
   read_servos(root, scenario);

@@ -6,6 +6,7 @@
 
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/experiment/figure_observer.h"
+#include "ftcs/sim/ptp_network.h"
 
 namespace ftcs::experiment {
 namespace {
@@ -108,7 +109,11 @@ RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo, st
   for (auto& node : world.nodes) node.discipline.servo = servo.config;
   if (trace != nullptr) trace->servo = servo.name;
   FigureObserver observer(scenario, trace);
-  sim::run_two_way(world, seed, observer);
+  if (scenario.network == "ptp") {
+    sim::run_ptp_network(world, seed, observer);
+  } else {
+    sim::run_two_way(world, seed, observer);
+  }
   return observer.figures();
 }
 
