@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "ftcs/experiment/recorded_log.h"
+
+namespace ftcs::experiment {
+
+/// One way to write a log. Lines go in one after the other; the pairs come out at the end.
+class LogFormat {
+ public:
+  virtual ~LogFormat() = default;
+  [[nodiscard]] virtual std::string name() const = 0;
+  /// Does the line that told the format hold no data?
+  [[nodiscard]] virtual bool is_heading(std::string_view line) const = 0;
+  /// Empty, or why the line cannot be used.
+  [[nodiscard]] virtual std::string take(std::string_view line) = 0;
+  virtual void finish(RecordedLog& log) = 0;
+
+ protected:
+  LogFormat() = default;
+  LogFormat(const LogFormat&) = default;
+  LogFormat& operator=(const LogFormat&) = default;
+};
+
+/// Null if the line does not tell.
+[[nodiscard]] std::unique_ptr<LogFormat> detect_format(std::string_view line);
+
+[[nodiscard]] std::unique_ptr<LogFormat> detect_linuxptp(std::string_view line);
+[[nodiscard]] std::unique_ptr<LogFormat> detect_chrony(std::string_view line);
+[[nodiscard]] std::unique_ptr<LogFormat> detect_csv(std::string_view line);
+
+/// A pair of a clock whose offset is known: free running = reference + offset.
+[[nodiscard]] RecordedPair offset_pair(Duration reference, Duration offset,
+                                       std::optional<double> truth_ns = {});
+
+/// Exact reading of a decimal number of `unit_ns` nanoseconds: whole units as integers, so that
+/// seconds since 1970 keep their nanoseconds. Nothing if it is no number or beyond 146 years.
+[[nodiscard]] std::optional<Duration> parse_time(std::string_view text, std::int64_t unit_ns);
+
+}  // namespace ftcs::experiment

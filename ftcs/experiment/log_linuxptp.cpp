@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "ftcs/experiment/log_formats.h"
+#include "ftcs/record/offset_log.h"
+
+namespace ftcs::experiment {
+namespace {
+
+/// A time within this part of the interval around a whole number of intervals is taken as that: the
+/// log's times are those of printing, to a millisecond, and 50 ppm of a millisecond are 50 ns.
+constexpr double kSnap = 0.25;
+
+std::string program_of(std::string_view line) {
+  for (const char* program : {"ptp4l", "phc2sys", "ts2phc"}) {
+    if (line.find(program) != std::string_view::npos) return program;
+  }
+  return "";
+}
+
+class LinuxptpLog final : public LogFormat {
+ public:
+  explicit LinuxptpLog(std::string program) : program_(std::move(program)) {}
+
+  [[nodiscard]] std::string name() const override { return program_; }
+  [[nodiscard]] bool is_heading(std::string_view) const override { return false; }
+
+  [[nodiscard]] std::string take(std::string_view line) override {
+    const auto parsed = parse_offset_log_line(line);
+    if (!parsed) return "no offset in it";
+    if (program_of(line) != program_ && !program_of(line).empty())
+      return "of another program than " + program_;
+    if (!parsed->frequency_ppb) return "an offset without a frequency";
+    if (parsed->time_s && !lines_.empty() && lines_.back().time_s &&
+        *parsed->time_s < *lines_.back().time_s) {
+      return "its time goes backward";
+    }
+    lines_.push_back(*parsed);
+    return "";
+  }
+
+  void finish(RecordedLog& log) override {
+    if (lines_.empty()) return;
+    const bool free_running = std::all_of(lines_.begin(), lines_.end(),
+                                          [](const OffsetLogLine& l) { return l.state == 0; });
+    const std::vector<double> steps_s = intervals(log);
+    log.notes.push_back(
+        free_running
+            ? "s0 throughout: the clock was free-running already; the frequency column is a "
+              "measurement and is not added"
+            : "the free-running clock is rebuilt from offset and applied frequency; a step (s1) "
+              "takes "
+              "the offset away");
+    log.notes.push_back(
+        "offsets are those that the program computed: its path-delay filter is in them");
+    Duration reference{};
+    double x_ns = lines_.front().offset_ns;
+    log.pairs.push_back(offset_pair(reference, Duration::from_ns(x_ns)));
+    for (std::size_t i = 1; i < lines_.size(); ++i) {
+      reference += Duration::from_ns(steps_s[i - 1] * 1e9);
+      x_ns = free_running ? lines_[i].offset_ns : x_ns + change_ns(i, steps_s[i - 1]);
+      log.pairs.push_back(offset_pair(reference, Duration::from_ns(x_ns)));
+    }
+  }
+
+ private:
+  /// How much the free-running clock gained between lines i - 1 and i. The printed frequency is how
+  /// fast the program takes the oscillator to be; it runs the clock slower by as much.
+  [[nodiscard]] double change_ns(std::size_t i, double dt_s) const {
+    const OffsetLogLine& before = lines_[i - 1];
+    const double start_ns = before.state == 1 ? 0.0 : before.offset_ns;
+    return lines_[i].offset_ns - start_ns + *before.frequency_ppb * dt_s;
+  }
+
+  [[nodiscard]] std::vector<double> intervals(RecordedLog& log) const {
+    std::vector<double> steps;
+    bool timed = true;
+    for (std::size_t i = 1; i < lines_.size(); ++i) {
+      timed = timed && lines_[i].time_s && lines_[i - 1].time_s;
+      steps.push_back(timed ? *lines_[i].time_s - *lines_[i - 1].time_s : 1.0);
+    }
+    if (!timed || steps.empty()) {
+      log.notes.push_back("lines without a time: one second between them is assumed");
+      std::fill(steps.begin(), steps.end(), 1.0);
+      return steps;
+    }
+    std::vector<double> ordered = steps;
+    std::sort(ordered.begin(), ordered.end());
+    const double median = ordered[ordered.size() / 2];
+    // Sync intervals are powers of two seconds; the median of times printed to 1 ms is near one.
+    const double nominal = median > 0.0 ? std::exp2(std::round(std::log2(median))) : 1.0;
+    const double interval = std::abs(median - nominal) < 0.1 * nominal ? nominal : median;
+    for (double& step : steps) {
+      const double whole = std::round(step / interval);
+      if (whole >= 1.0 && std::abs(step - whole * interval) < kSnap * interval)
+        step = whole * interval;
+    }
+    return steps;
+  }
+
+  std::string program_;
+  std::vector<OffsetLogLine> lines_;
+};
+
+}  // namespace
+
+std::unique_ptr<LogFormat> detect_linuxptp(std::string_view line) {
+  if (!is_linuxptp_line(line) && !parse_offset_log_line(line)) return nullptr;
+  // Start-up messages come before the first offset; the program is told by the first line that has
+  // one.
+  if (!parse_offset_log_line(line)) return nullptr;
+  const std::string program = program_of(line);
+  return std::make_unique<LinuxptpLog>(program.empty() ? "ptp4l" : program);
+}
+
+}  // namespace ftcs::experiment
