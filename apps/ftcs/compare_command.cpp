@@ -8,9 +8,11 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/experiment_files.h"
+#include "apps/ftcs/output.h"
 #include "apps/ftcs/sweep_options.h"
 #include "ftcs/experiment/scenario.h"
 #include "ftcs/experiment/scenario_error.h"
+#include "ftcs/report/log_report.h"
 
 namespace ftcs::app {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 struct CompareOptions {
   std::string file;
   std::string suite;
+  std::string log;
   SweepOptions sweep;
 };
 
@@ -33,7 +36,25 @@ std::vector<experiment::Scenario> parse_all(const std::vector<ExperimentFile>& f
   return scenarios;
 }
 
+int compare_log(const CompareOptions& options) {
+  auto log = experiment::read_recorded_log(options.log);
+  if (!log) {
+    fmt::print(stderr, "ftcs: {}\n", log.error().text());
+    return kRuntimeError;
+  }
+  LogComparison comparison{options.log, std::move(*log), {}};
+  comparison.servos = experiment::replay_log(comparison.log);
+  if (!options.sweep.quiet) fmt::print("{}", log_console(comparison));
+  const SweepOptions& files = options.sweep;
+  bool written =
+      files.json.empty() || write_result(files.json, dump(log_json(comparison, FTCS_VERSION)));
+  written &= files.csv.empty() || write_result(files.csv, log_table(comparison).to_csv());
+  written &= files.html.empty() || write_result(files.html, log_html(comparison, FTCS_VERSION));
+  return written ? kSuccess : kRuntimeError;
+}
+
 int compare(const CompareOptions& options) {
+  if (!options.log.empty()) return compare_log(options);
   if (!options.file.empty()) {
     return run_and_report(experiment::load_scenarios(options.file), options.file, options.sweep);
   }
@@ -84,6 +105,12 @@ void add_compare_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("--suite", options->suite,
                    "all scenario files of a folder, or a built-in suite: peers")
+      ->excludes(file);
+  command
+      ->add_option("--log", options->log,
+                   "replay a log instead: ptp4l, phc2sys, chrony tracking or measurements, CSV of "
+                   "t1..t4 or of "
+                   "offsets; also gzip; - = standard input")
       ->excludes(file);
   add_sweep_options(*command, options->sweep);
   command->callback([options, &exit_code] { exit_code = guarded(compare, *options); });

@@ -148,6 +148,19 @@ baseline::KalmanNoise true_noise(const Scenario& scenario) {
   return noise;
 }
 
+/// Is the world one whose noise the filter can be told: white and random-walk FM of one clock, and
+/// constants?
+bool has_linear_bound(const Scenario& scenario) {
+  const auto known = [](const sim::FrequencyPart& part) {
+    return std::holds_alternative<sim::ConstantSkew>(part) ||
+           std::holds_alternative<sim::WhiteFm>(part) ||
+           std::holds_alternative<sim::RandomWalkFm>(part);
+  };
+  const auto& nodes = scenario.world.nodes;
+  const auto& parts = nodes.front().oscillator.parts;
+  return nodes.size() == 1 && std::all_of(parts.begin(), parts.end(), known);
+}
+
 void add_bound(TomlTable& root, Scenario& scenario) {
   ScenarioServo bound{std::string(kBoundName), default_config(ServoKind::kKalman, scenario)};
   bound.config.kalman.noise = true_noise(scenario);
@@ -156,6 +169,10 @@ void add_bound(TomlTable& root, Scenario& scenario) {
     read_kalman_noise(*table, bound.config.kalman.noise);
     table->finish();
     if (!wanted) return;
+  } else if (!has_linear_bound(scenario)) {
+    scenario.notes.emplace_back(
+        "No known-noise bound here: this clock is no linear noise process. [bound] sets one.");
+    return;
   }
   scenario.servos.push_back(std::move(bound));
 }
