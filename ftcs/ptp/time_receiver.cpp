@@ -11,6 +11,9 @@ namespace {
 /// 9.3.2.5: a data set that has come this far is worth nothing.
 constexpr std::uint16_t kMaximumStepsRemoved = 255;
 
+/// 11.3.2: every Delay_Resp takes the fraction of its stamp off the correction. That is no finding.
+constexpr Duration kUsualNegativeCorrection{Nanoseconds{-1}};
+
 bool same_reference(const TransmitterData& a, const TransmitterData& b) noexcept {
   return a.port == b.port && a.announce.grandmaster == b.announce.grandmaster;
 }
@@ -194,7 +197,7 @@ bool TimeReceiver::usable_correction(const Header& header) noexcept {
     counters_.add(Counter::kAbsurdCorrection);
     return false;
   }
-  if (header.correction < Duration{}) counters_.add(Counter::kNegativeCorrection);
+  if (header.correction < kUsualNegativeCorrection) counters_.add(Counter::kNegativeCorrection);
   return true;
 }
 

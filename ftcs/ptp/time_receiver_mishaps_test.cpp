@@ -267,6 +267,16 @@ TEST_F(Receiver, small_negative_corrections_are_used_and_counted) {
   EXPECT_EQ(count(Counter::kNegativeCorrection), 1U);
 }
 
+TEST_F(Receiver, the_fraction_of_a_stamp_in_a_delay_resp_is_no_negative_correction) {
+  select_a();
+  static_cast<void>(exchange(1, 1s));
+  static_cast<void>(receiver_.on_transmit_timestamp(0, local(1s), local(1s)));
+  Message response = delay_resp(0, 1s + kDelay);
+  response.header.correction = -Duration::from_ns(0.75);
+  ASSERT_EQ(of<EmitPair>(general(response, 1s + 2 * kDelay)).size(), 1U);
+  EXPECT_EQ(count(Counter::kNegativeCorrection), 0U);
+}
+
 TEST_F(Receiver, corrections_of_more_than_a_second_are_refused) {
   select_a();
   for (const Duration absurd :
