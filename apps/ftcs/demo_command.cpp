@@ -159,21 +159,27 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       "lock a clock to another over PTP on this machine: no root, no configuration, truth known");
   const auto arguments = std::make_shared<DemoArguments>();
   DemoOptions& options = arguments->options;
-  command->add_option("--duration", options.duration_s, "seconds; default 20")
+  command->add_option("--duration", options.duration_s, "default 20")
+      ->type_name("SECONDS")
       ->check(number_from(3, 86'400));
   command->add_option("--json", arguments->json_file, "write the figures to this file")
       ->type_name("FILE");
-  command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms");
-  command->add_option("--skew", arguments->skew, "of its oscillator; default 50ppm");
+  command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms")
+      ->type_name("TIME");
+  command->add_option("--skew", arguments->skew, "of its oscillator; default 50ppm")
+      ->type_name("RATE");
   command
       ->add_option("--logSyncInterval", options.log_sync_interval,
                    "log2 of seconds; default -3 (125 ms)")
+      ->type_name("N")
       ->check(integer_from(-7, 0));
   command
       ->add_option("--event-port", options.event_port,
                    "UDP port, and the next one for general messages")
+      ->type_name("PORT")
       ->check(integer_from(1024, 65'534));
-  command->add_flag("!--no-live", options.live_view, "no live view on the terminal");
+  command->add_flag_callback(
+      "--no-live", [&options] { options.live_view = false; }, "no live view on the terminal");
   command->callback([arguments, &exit_code] {
     if (const auto wrong = complete(*arguments)) {
       fmt::print(stderr, "ftcs demo: {}\n", *wrong);

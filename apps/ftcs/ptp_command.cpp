@@ -216,33 +216,51 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
 void add_own_flags(CLI::App& command, PtpArguments& arguments) {
   command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
       ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
-  command.add_option("--servo", arguments.servo, servo_names() + "; default ftcs");
-  command.add_option("--offset-gain", arguments.offset_gain,
-                     "ftcs: p inside the band, 0 to 1; default 1/16");
-  command.add_option("--converged-band", arguments.converged_band,
-                     "ftcs: B, as ENTER[:LEAVE], for example 1us:5us");
+  command.add_option("--servo", arguments.servo, servo_names() + "; default ftcs")
+      ->type_name("NAME");
+  command
+      .add_option("--offset-gain", arguments.offset_gain,
+                  "ftcs: p inside the band, 0 to 1; default 1/16")
+      ->type_name("P");
+  command
+      .add_option("--converged-band", arguments.converged_band,
+                  "ftcs: B, as ENTER[:LEAVE], for example 1us:5us")
+      ->type_name("BAND");
   command
       .add_option("--converged-dwell", arguments.converged_dwell,
                   "ftcs: samples inside the band before p applies; default 4")
+      ->type_name("N")
       ->check(integer_from(0, 1'000'000'000));
-  command.add_option("--correction-time", arguments.correction_time,
-                     "ftcs: T_c, in which an offset is removed; default: the Sync interval");
-  command.add_option("--max-frequency", arguments.max_frequency,
-                     "largest adjustment, for example 500ppm");
-  command.add_option("--clock", arguments.clock, "virtual (the only one)");
-  command.add_option("--offset", arguments.offset,
-                     "the virtual clock starts at CLOCK_REALTIME plus this, for example 1ms");
-  command.add_option("--skew", arguments.skew,
-                     "rate error of the virtual clock's oscillator, for example 50ppm");
+  command
+      .add_option("--correction-time", arguments.correction_time,
+                  "ftcs: T_c, in which an offset is removed; default: the Sync interval")
+      ->type_name("TIME");
+  command
+      .add_option("--max-frequency", arguments.max_frequency,
+                  "largest adjustment, for example 500ppm")
+      ->type_name("RATE");
+  command.add_option("--clock", arguments.clock, "virtual (the only one)")->type_name("NAME");
+  command
+      .add_option("--offset", arguments.offset,
+                  "the virtual clock starts at CLOCK_REALTIME plus this, for example 1ms")
+      ->type_name("TIME");
+  command
+      .add_option("--skew", arguments.skew,
+                  "rate error of the virtual clock's oscillator, for example 50ppm")
+      ->type_name("RATE");
   command.add_flag("--first-step", arguments.first_step, "allow one step at the start");
   auto* json = command.add_flag("--json", arguments.json, "one JSON object a sample");
   command.add_flag("--csv", arguments.csv, "one CSV line a sample")->excludes(json);
   command.add_option("--event-port", arguments.event_port, "UDP port; default 319")
+      ->type_name("PORT")
       ->check(integer_from(1, 65'535));
   command.add_option("--general-port", arguments.general_port, "UDP port; default 320")
+      ->type_name("PORT")
       ->check(integer_from(1, 65'535));
-  command.add_option("--unicast", arguments.unicast, "IPv4 address of the only peer");
+  command.add_option("--unicast", arguments.unicast, "IPv4 address of the only peer")
+      ->type_name("ADDRESS");
   command.add_option("--duration", arguments.duration_s, "stop after so many seconds")
+      ->type_name("SECONDS")
       ->check(number_from(0.001, 1e9));
 }
 
@@ -263,6 +281,7 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
               arguments->settings.emplace_back(name, value);
             },
             setting.help)
+        ->type_name("VALUE")
         ->group("Settings of ptp4l's configuration file");
   }
   command->callback([arguments, &exit_code] {
