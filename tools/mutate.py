@@ -172,7 +172,7 @@ class Layer:
         command = [self.compiler, *map(str, objects), "-o", str(program), "-lgtest_main", "-lgtest", "-lpthread"]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode != 0:
-            return done.stderr
+            raise RuntimeError(f"{program.name} does not link:\n{done.stderr}")
         try:
             done = subprocess.run([str(program), "--gtest_brief=1"], capture_output=True, text=True, cwd=ROOT,
                                   env={**os.environ, "GTEST_FAIL_FAST": "1"}, timeout=seconds)
@@ -295,12 +295,21 @@ def run_layer(layer, arguments, equivalents, tally):
                 print(f"{change} killed by {killer}", flush=True)
 
 
+def take_snapshot(scratch):
+    """A copy of the sources, so that they may be edited meanwhile."""
+    global ROOT
+    for part in ["ftcs", "test/support"]:
+        shutil.copytree(ROOT / part, scratch / "tree" / part)
+    ROOT = scratch / "tree"
+
+
 def main():
     arguments = parse_arguments()
     equivalents = read_equivalents()
     tally = {"killed": 0, "compiler": 0, "equivalent": 0, "survived": 0}
     scratch = Path(tempfile.mkdtemp(prefix="ftcs-mutate-"))
     try:
+        take_snapshot(scratch)
         # The test framework is most of what is compiled: once is enough.
         (scratch / "all.h").write_text("#include <gtest/gtest.h>\n#include <random>\n#include <cmath>\n")
         if not arguments.list:
