@@ -41,7 +41,7 @@ class TwoWayServo {
     delay_.reset();
     gate_.reset();
     law_.reset();
-    has_latest_ = has_accepted_ = law_fed_ = false;
+    has_latest_ = law_fed_ = false;
   }
 
   /// The clock has been stepped by somebody else.
@@ -80,7 +80,7 @@ class TwoWayServo {
 
   [[nodiscard]] GateDecision judge(const TimestampPair& pair) noexcept {
     const bool rate_known = config_.path_delay.rate_compensated && delay_.rate_known();
-    if (!config_.gate_enabled || !has_accepted_ || !rate_known) return GateDecision::kAccept;
+    if (!config_.gate_enabled || !rate_known) return GateDecision::kAccept;
     const ReferenceTime predicted =
         accepted_.reference +
         scale(pair.free_running - accepted_.free_running, delay_.rate_ratio());
@@ -96,17 +96,16 @@ class TwoWayServo {
     if (decision == GateDecision::kExit) {
       law_.reset();
       delay_.restart();
-      has_accepted_ = false;
     }
     const TimestampPair previous = accepted_;
-    const bool has_previous = has_accepted_;
     accepted_ = pair;
-    has_accepted_ = true;
     const bool was_known = path_delay_known();
     delay_.on_forward(pair.reference, delay_stamp(pair));
     if (!path_delay_known()) return {};
     if constexpr (requires { law_.prime(sample_of(previous)); }) {
-      if (!was_known && has_previous) law_.prime(sample_of(previous));
+      // A forward message makes the delay known only by completing an exchange with its
+      // predecessor.
+      if (!was_known) law_.prime(sample_of(previous));
     }
     law_fed_ = true;
     return law_.update(sample_of(pair), now);
@@ -125,7 +124,6 @@ class TwoWayServo {
   OutlierGate gate_;
   Law law_;
   bool has_latest_ = false;
-  bool has_accepted_ = false;
   bool law_fed_ = false;
   TimestampPair latest_{};    ///< newest forward message, used or not
   TimestampPair accepted_{};  ///< newest forward message that was not rejected
