@@ -47,6 +47,7 @@ struct ExchangeScenario {
   double outage_end_s = 0.0;
   bool one_way = false;  ///< no Delay_Req at all
   double loss_probability = 0.0;
+  double tick_ns = 0.0;  ///< local stamps are multiples of this (rounded down)
 };
 
 struct ExchangeResult {
@@ -188,8 +189,10 @@ class ExchangeSimulator {
     TimestampPair pair;
     pair.direction = direction;
     pair.reference = ReferenceTime{instant(reference_time, reference_lead_)};
-    pair.free_running = FreeRunningTime{instant(now_, lead_)};
-    pair.local = LocalTime{instant(now_, lead_ + local_lead_)};
+    double lost = 0.0;
+    if (scenario_.tick_ns > 0.0) lost = std::fmod(now_ + lead_, scenario_.tick_ns);
+    pair.free_running = FreeRunningTime{instant(now_, lead_ - lost)};
+    pair.local = LocalTime{instant(now_, lead_ + local_lead_ - lost)};
     return pair;
   }
 
