@@ -82,9 +82,10 @@ class TwoWayRun {
     const EventPair pair{Direction::kForward, chain_.upstream_stamp(index, now_),
                          FreeRunningTime{}};
     const Arrivals arrivals = chain_.node(index).forward.send(now_);
-    for (int copy = 0; copy < arrivals.count; ++copy) {
-      queue_.schedule(arrivals.times[static_cast<std::size_t>(copy)],
-                      {EventKind::kSyncArrives, index, pair});
+    // The first copy alone: a PTP port takes each sequenceId once. run_ptp_network has the port
+    // itself.
+    if (arrivals.count > 0) {
+      queue_.schedule(arrivals.times[0], {EventKind::kSyncArrives, index, pair});
     }
     if (spec_.two_way) {
       queue_.schedule(now_ + Duration::from_ns(request_share * interval.ns()),
