@@ -20,6 +20,8 @@ enum ExitCode : int {
 void add_analyse_command(CLI::App& app, int& exit_code);
 void add_compare_command(CLI::App& app, int& exit_code);
 void add_demo_command(CLI::App& app, int& exit_code);
+void add_ethercat_command(CLI::App& app, int& exit_code);
+void add_ethercat_segment_command(CLI::App& app, int& exit_code);
 void add_paper_command(CLI::App& app, int& exit_code);
 void add_ptp_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);

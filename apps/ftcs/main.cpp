@@ -19,6 +19,8 @@ int run(int argc, char** argv) {
   add_analyse_command(app, exit_code);
   add_demo_command(app, exit_code);
   add_compare_command(app, exit_code);
+  add_ethercat_command(app, exit_code);
+  add_ethercat_segment_command(app, exit_code);
   add_paper_command(app, exit_code);
   add_ptp_command(app, exit_code);
   add_simulate_command(app, exit_code);

@@ -54,6 +54,7 @@ class BasicCycleServo {
                                     const ClockReading& now) noexcept;
   void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
   void restart_law() noexcept;
+  [[nodiscard]] bool rate_known() const noexcept;
   [[nodiscard]] FreeRunningTime stamp_of(const CycleSample& sample) const noexcept;
   [[nodiscard]] CycleDecision decide(FreeRunningTime now) noexcept;
 
@@ -68,6 +69,7 @@ class BasicCycleServo {
   CycleDecision decision_{};
   CycleServoCounters counters_{};
   bool anchored_ = false;
+  std::uint32_t commands_ = 0;      ///< of the law since it started
   std::uint32_t until_sync_ = 0;    ///< cycles until FTCS or PICS takes its next sample
   std::uint32_t coasting_ = 0;      ///< cycles without a usable sample
   std::uint32_t out_of_phase_ = 0;  ///< consecutive samples further off than half a cycle

@@ -28,6 +28,7 @@ inline constexpr std::uint32_t kOutOfPhaseForResync = 3;
   result.sync_interval = interval_of(config);
   result.proportional_gain = config.proportional_gain;
   result.integral_gain = config.integral_gain;
+  result.initial_rate = config.initial_rate;
   result.limits = config.limits;
   result.plausible_ratio = config.limits;
   return result;
@@ -60,7 +61,7 @@ BasicCycleServo<Adaptive>::BasicCycleServo(const CycleServoConfig& config) noexc
 
 template <class Adaptive>
 CycleDecision BasicCycleServo<Adaptive>::start(FreeRunningTime now) noexcept {
-  history_ = SteeringHistory({now, LocalTime{}, Rate{}});
+  history_ = SteeringHistory({now, LocalTime{}, config_.initial_rate});
   timer_ = CycleTimer({.first = LocalTime{config_.cycle},
                        .cycle_time = config_.cycle,
                        .resolution = config_.resolution});
@@ -75,8 +76,17 @@ void BasicCycleServo<Adaptive>::restart_law() noexcept {
   ftcs_.reset();
   pics_.reset();
   adaptive_.reset();
+  commands_ = 0;
   until_sync_ = 0;
   out_of_phase_ = 0;
+}
+
+/// In phase by the start's jump alone is no lock: the first interval still drifts away from it.
+/// FTCS knows the rate with its first command, the others learn it from the second on.
+template <class Adaptive>
+bool BasicCycleServo<Adaptive>::rate_known() const noexcept {
+  if (config_.law == CycleLaw::kNone) return true;
+  return commands_ >= (config_.law == CycleLaw::kFtcs ? 1U : 2U);
 }
 
 template <class Adaptive>
@@ -151,9 +161,9 @@ void BasicCycleServo<Adaptive>::anchor(const CycleSample& sample, FreeRunningTim
       cycle_servo_detail::floor_to(at_trigger.rounded_ns() - shift + cycle / 2, cycle) + shift;
   LocalTime first = LocalTime::from_ns(nearest);
   if (config_.align_at_start) {
-    history_ = SteeringHistory({stamp, LocalTime{reference}, Rate{}});
+    history_ = SteeringHistory({stamp, LocalTime{reference}, config_.initial_rate});
   } else {
-    history_ = SteeringHistory({trigger_.virtual_instant, first, Rate{}});
+    history_ = SteeringHistory({trigger_.virtual_instant, first, config_.initial_rate});
   }
   timer_ =
       CycleTimer({.first = first, .cycle_time = config_.cycle, .resolution = config_.resolution});
@@ -179,7 +189,7 @@ void BasicCycleServo<Adaptive>::follow(const CycleSample& sample, FreeRunningTim
     return;
   }
   decision_.phase_error = error;
-  lock_.update(error);
+  if (rate_known()) lock_.update(error);
   const ServoUpdate update = ask_law(sample, stamp, {now, history_.local_at(now)});
   if (update.has_command) apply(update.command, now);
 }
@@ -210,6 +220,7 @@ void BasicCycleServo<Adaptive>::apply(const ServoCommand& command, FreeRunningTi
   }
   decision_.rate = tracking;
   decision_.commanded = true;
+  ++commands_;
 }
 
 template <class Adaptive>

@@ -35,6 +35,9 @@ struct CycleServoConfig {
   double integral_gain = 1.0;
   /// F. A hundredth is far beyond any crystal; it bounds how the cycle is bent to remove a phase.
   RateLimits limits = RateLimits::symmetric_ppb(1e7);
+  /// What the steered clock runs at before the first command, per host time: a crystal known from
+  /// before.
+  Rate initial_rate{};
   /// From the stamp `sent` to the latch at the reference: known wiring, stamping point.
   Nanoseconds transit{0};
   /// Gates: a cycle that was later, or a frame that took longer, is coasted over. Zero: no gate.

@@ -197,9 +197,10 @@ void MainDevice::recover(std::size_t position) noexcept {
 }
 
 void MainDevice::begin_stop(const Failure& failure) noexcept {
+  if (stage_ == Stage::kStopping || stage_ == Stage::kStopped) return;
   failure_ = failure;
   stop_frames_ = kStopFrames;
-  stage_ = stage_ == Stage::kStopped ? Stage::kStopped : Stage::kStopping;
+  stage_ = Stage::kStopping;
 }
 
 }  // namespace ftcs::ethercat

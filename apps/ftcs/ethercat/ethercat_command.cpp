@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/ethercat/main_runner.h"
+#include "apps/ftcs/units.h"
+#include "ftcs/platform/stop_flag.h"
+#include "ftcs/report/write_file.h"
+
+namespace ftcs::app {
+
+namespace {
+
+struct EthercatArguments {
+  RunOptions options;
+  std::string udp;
+  std::string servo = "ftcs";
+  std::string cycle = "1ms";
+  std::string sync_interval = "500ms";
+  std::string shift = "0";
+  std::string resolution = "1ns";
+  std::string band = "20us";
+  std::string transit = "0";
+  std::string gate = "200us";
+  std::string spin = "0";
+  std::vector<double> gains;
+  bool slew = false;
+};
+
+using Wrong = std::optional<std::string>;
+
+Wrong read(const char* flag, const std::string& text, std::int64_t lowest, Nanoseconds& target) {
+  const auto value = parse_duration(text);
+  if (!value) return fmt::format("{}: {}", flag, value.error().message);
+  if (value->floor_ns() < lowest) return fmt::format("{}: '{}' is too small", flag, text);
+  target = Nanoseconds{value->rounded_ns()};
+  return std::nullopt;
+}
+
+Wrong read_law(EthercatArguments& arguments) {
+  CycleServoConfig& servo = arguments.options.servo;
+  if (arguments.servo == "ftcs") servo.law = CycleLaw::kFtcs;
+  if (arguments.servo == "pics") servo.law = CycleLaw::kPics;
+  if (arguments.servo == "adaptive") servo.law = CycleLaw::kAdaptive;
+  if (arguments.servo == "none") servo.law = CycleLaw::kNone;
+  if (arguments.servo == "soem-pi") {
+    // SOEM's published sample: T + 0.01 e + 2e-5 sum(e) every cycle, which in increments is PICS
+    // with an interval of one cycle; it takes the frame's time for the cycle's.
+    servo.law = CycleLaw::kPics;
+    servo.cycles_per_sync = 1;
+    servo.proportional_gain = 0.01;
+    servo.integral_gain = 2e-5;
+    servo.trigger = TriggerModel::kIdeal;
+  }
+  if (arguments.gains.empty()) return std::nullopt;
+  if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
+    return "--gains: two numbers, as in 1,1";
+  }
+  servo.proportional_gain = arguments.gains[0];
+  servo.integral_gain = arguments.gains[1];
+  return std::nullopt;
+}
+
+Wrong complete(EthercatArguments& arguments) {
+  RunOptions& options = arguments.options;
+  CycleServoConfig& servo = options.servo;
+  if (!arguments.udp.empty()) {
+    const std::size_t colon = arguments.udp.rfind(':');
+    options.host = arguments.udp.substr(0, colon);
+    if (colon != std::string::npos) {
+      const auto port = parse_integer(arguments.udp.substr(colon + 1), 1, 65535);
+      if (!port) return "--udp: " + port.error().message;
+      options.port = static_cast<std::uint16_t>(*port);
+    }
+  }
+  Nanoseconds interval{0};
+  Nanoseconds band{0};
+  constexpr std::int64_t kShortestCycle = 50'000;
+  if (auto wrong = read("--cycle", arguments.cycle, kShortestCycle, servo.cycle)) return wrong;
+  if (auto wrong = read("--sync-interval", arguments.sync_interval, 1, interval)) return wrong;
+  if (auto wrong = read("--shift", arguments.shift, 0, servo.shift)) return wrong;
+  if (auto wrong = read("--timer-resolution", arguments.resolution, 1, servo.resolution))
+    return wrong;
+  if (auto wrong = read("--converged-band", arguments.band, 0, band)) return wrong;
+  if (auto wrong = read("--transit", arguments.transit, 0, servo.transit)) return wrong;
+  if (auto wrong = read("--gate", arguments.gate, 0, servo.largest_lateness)) return wrong;
+  if (auto wrong = read("--spin", arguments.spin, 0, options.spin)) return wrong;
+  servo.largest_round_trip = servo.largest_lateness;
+  servo.band = {band, band};
+  servo.cycles_per_sync =
+      static_cast<std::uint32_t>(std::max<std::int64_t>(1, interval / servo.cycle));
+  servo.align_at_start = !arguments.slew;
+  return read_law(arguments);
+}
+
+Result<platform::EthercatLink, platform::OsError> open_link(const RunOptions& options) {
+  return options.interface.empty() ? platform::EthercatLink::connect_udp(options.host, options.port)
+                                   : platform::EthercatLink::open_raw(options.interface);
+}
+
+int run_scan(EthercatArguments arguments) {
+  if (const auto wrong = complete(arguments)) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
+    return kUsageError;
+  }
+  auto link = open_link(arguments.options);
+  if (!link) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", link.error().message());
+    return kRuntimeError;
+  }
+  const platform::StopFlag stop;
+  MainRunner runner(arguments.options, std::move(*link));
+  if (!runner.bring_up([&stop] { return stop.is_set(); }, true)) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner.main().failure()));
+    return kRuntimeError;
+  }
+  print_scan(runner.main());
+  return kSuccess;
+}
+
+void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options) {
+  const auto got = [](bool obtained) { return obtained ? "obtained" : "refused"; };
+  fmt::print("SCHED_FIFO {} {}, mlockall {}, pinned to a processor {}, no sleep states {}\n",
+             options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
+             got(setup.memory_locked), options.cpu >= 0 ? got(setup.pinned) : "not asked for",
+             got(setup.latency_held));
+}
+
+int run_main(EthercatArguments arguments) {
+  if (const auto wrong = complete(arguments)) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
+    return kUsageError;
+  }
+  const RunOptions& options = arguments.options;
+  auto link = open_link(options);
+  if (!link) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", link.error().message());
+    return kRuntimeError;
+  }
+  const platform::StopFlag stop_flag;
+  const auto stop = [&stop_flag] { return stop_flag.is_set(); };
+  const auto runner = std::make_unique<MainRunner>(options, std::move(*link));
+  const auto setup = platform::make_realtime(options.priority, options.cpu);
+  if (!options.quiet) print_setup(setup, options);
+  if (!runner->bring_up(stop, false)) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner->main().failure()));
+    return kRuntimeError;
+  }
+  runner->run(stop);
+  if (!options.quiet) print_run(*runner);
+  if (!options.json.empty()) {
+    if (const auto error = write_file(options.json, run_json(*runner))) {
+      fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
+      return kRuntimeError;
+    }
+  }
+  if (runner->main().failure()) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner->main().failure()));
+    return kRuntimeError;
+  }
+  return runner->decision().state == CycleState::kLocked ? kSuccess : kNotLocked;
+}
+
+void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
+  auto* interface = command.add_option("-i,--interface", arguments.options.interface,
+                                       "raw Ethernet on this interface (needs CAP_NET_RAW)");
+  command.add_option("--udp", arguments.udp, "HOST[:PORT] of a segment; default 127.0.0.1:34980")
+      ->excludes(interface);
+  command.add_option("--drives", arguments.options.drives, "fewer than these are an error");
+}
+
+void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
+  RunOptions& options = arguments.options;
+  command.add_option("--servo", arguments.servo, "ftcs (default), pics, adaptive, soem-pi or none")
+      ->check(CLI::IsMember({"ftcs", "pics", "adaptive", "soem-pi", "none"}));
+  command.add_option("--cycle", arguments.cycle, "default 1ms");
+  command.add_option("--sync-interval", arguments.sync_interval,
+                     "ftcs and pics act once in this time; default 500ms");
+  command.add_option("--offset-gain", options.servo.offset_gain, "ftcs: p inside the band")
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--converged-band", arguments.band, "ftcs: B; default 20us");
+  command.add_option("--gains", arguments.gains, "pics: k_p,k_i times the cycles per interval")
+      ->delimiter(',');
+  command.add_option("--shift", arguments.shift, "frames leave so long after whole cycles");
+  command
+      .add_option("--sync0-phase", options.sync0_phase, "SYNC0 after the frame, part of a cycle")
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--timer-resolution", arguments.resolution, "10us is the paper's timer");
+  command.add_option("--transit", arguments.transit, "from the transmit stamp to the reference");
+  command.add_option("--gate", arguments.gate, "largest lateness and round trip; default 200us");
+  command.add_flag("--slew", arguments.slew, "the servo removes the first phase, no jump");
+  command.add_option("--drift-pulses", options.drift_pulses,
+                     "before the first cycle; default 15000");
+  command.add_option("--spin", arguments.spin, "keep the processor busy so long before a cycle");
+  command.add_option("--priority", options.priority, "SCHED_FIFO, 0 for none; default 80")
+      ->check(CLI::Range(0, 99));
+  command.add_option("--cpu", options.cpu, "pin to this processor");
+  command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+  command.add_flag("!--no-motion", options.move, "leave the axes disabled");
+  command.add_flag("-q,--quiet", options.quiet, "no live lines");
+  command.add_option("--json", options.json, "write the figures to this file");
+  command.add_option("--csv", options.csv, "write each cycle to this file");
+}
+
+}  // namespace
+
+void add_ethercat_command(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("ethercat", "EtherCAT MainDevice with a cycle servo");
+  command->require_subcommand(1);
+  const auto arguments = std::make_shared<EthercatArguments>();
+  CLI::App* scan = command->add_subcommand("scan", "what is on the wire");
+  add_link_flags(*scan, *arguments);
+  scan->callback([arguments, &exit_code] { exit_code = run_scan(*arguments); });
+  CLI::App* run = command->add_subcommand("run", "drives in OP, cycle in phase with their clock");
+  add_link_flags(*run, *arguments);
+  add_run_flags(*run, *arguments);
+  run->callback([arguments, &exit_code] { exit_code = run_main(*arguments); });
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/ethercat/main_runner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "ftcs/ethercat/maindevice/csp_profile.h"
+
+namespace ftcs::app {
+
+namespace {
+
+using ethercat::AlState;
+using platform::HostClock;
+
+/// A frame of the bring-up that is not back by then is lost.
+constexpr Nanoseconds kReplyTimeout{5'000'000};
+/// The part of a cycle in which its frame must be back.
+constexpr double kReplyShare = 0.8;
+/// Asking for OP again and again would only fill the frames.
+constexpr std::uint64_t kCyclesBetweenRequests = 1000;
+/// Live lines on the terminal.
+constexpr Nanoseconds kLineInterval{1'000'000'000};
+/// Circle of the demonstration: counts, and seconds for one turn.
+constexpr double kRadius = 10'000.0;
+constexpr double kTurn_s = 2.0;
+
+LocalTime as_local(FreeRunningTime time) { return LocalTime{time.since_epoch()}; }
+
+ethercat::MainDeviceConfig make_config(const RunOptions& options, bool scan_only,
+                                       std::span<const ethercat::SdoDownload> objects) {
+  ethercat::MainDeviceConfig config;
+  config.expected_subdevices = options.drives;
+  config.scan_only = scan_only;
+  config.clocks.drift_pulses = scan_only ? 0 : options.drift_pulses;
+  config.process.objects = objects;
+  config.process.cycle = options.servo.cycle;
+  const auto cycle = static_cast<double>(options.servo.cycle.count());
+  config.process.sync0_shift =
+      options.servo.shift + Nanoseconds{static_cast<std::int64_t>(options.sync0_phase * cycle)};
+  return config;
+}
+
+}  // namespace
+
+MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
+    : options_(options), link_(std::move(link)) {
+  const auto objects = ethercat::csp_objects(options.servo.cycle);
+  objects_.assign(objects.begin(), objects.end());
+  // Lost frames of a shared line shall not fault the drives: six misses in a row do (3 each).
+  constexpr std::uint32_t kSyncErrorLimit = 17;
+  objects_.push_back({{0x10F1, 2}, 2, kSyncErrorLimit});
+  servo_ = std::make_unique<CycleServo>(options.servo);
+  if (!options.csv.empty()) csv_.reset(std::fopen(options.csv.c_str(), "w"));
+  if (csv_) {
+    fmt::print(csv_.get(),
+               "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,"
+               "working_counter,margin_ns\n");
+  }
+}
+
+bool MainRunner::exchange(FreeRunningTime deadline, CycleSample* sample) {
+  const ethercat::ConstBytes frame = main_->next_frame();
+  if (frame.empty()) return false;
+  FreeRunningTime sent = HostClock::now();
+  const int error = link_.send(frame);
+  bool answered = false;
+  FreeRunningTime received = sent;
+  while (error == 0 && !answered) {
+    const auto back = link_.receive(deadline, false);
+    if (!back) break;
+    received = back->stamp;
+    const auto outcome = main_->on_frame(back->frame, {as_local(sent), as_local(back->stamp)});
+    answered = outcome != ethercat::FrameOutcome::kIgnored;
+  }
+  if (const auto stamp = link_.transmit_stamp()) sent = *stamp;
+  if (!answered) main_->on_timeout();
+  if (sample != nullptr) {
+    sample->sent = sent;
+    sample->received = received;
+    sample->has_received = answered;
+  }
+  return answered;
+}
+
+bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
+  main_ = std::make_unique<ethercat::MainDevice>(make_config(options_, scan_only, objects_));
+  auto stage = ethercat::Stage::kStopped;
+  while (!main_->cyclic() && main_->stage() != ethercat::Stage::kStopped) {
+    if (stop()) return false;
+    if (stage != main_->stage() && !options_.quiet && !scan_only) {
+      stage = main_->stage();
+      fmt::print("{} ...\n", ethercat::name(stage));
+      std::fflush(stdout);
+    }
+    exchange(HostClock::now() + Duration{kReplyTimeout}, nullptr);
+  }
+  return !main_->failure();
+}
+
+void MainRunner::run(const std::function<bool()>& stop) {
+  axes_.resize(main_->network().count);
+  const FreeRunningTime start = HostClock::now();
+  next_line_ = start + Duration{kLineInterval};
+  decision_ = servo_->start(start);
+  while (!stop() && main_->stage() == ethercat::Stage::kCyclic) {
+    if (options_.duration_s > 0.0 && (HostClock::now() - start).seconds() > options_.duration_s) {
+      break;
+    }
+    cycle();
+  }
+  // The drives shall not find out by their watchdogs.
+  main_->stop();
+  while (main_->stage() != ethercat::Stage::kStopped) {
+    exchange(HostClock::now() + Duration{kReplyTimeout}, nullptr);
+  }
+}
+
+void MainRunner::cycle() {
+  HostClock::wait_until(decision_.wake, options_.spin);
+  move_axes();
+  const auto limit =
+      static_cast<std::int64_t>(kReplyShare * static_cast<double>(options_.servo.cycle.count()));
+  CycleSample sample;
+  const bool answered = exchange(HostClock::now() + Duration::from_whole_ns(limit), &sample);
+  const ethercat::CycleReport& report = main_->last_cycle();
+  sample.has_reference = answered && report.has_reference;
+  sample.reference = report.reference;
+  decision_ = servo_->update(sample, HostClock::now());
+  note(sample, answered);
+  supervise();
+  if (csv_) write_csv(sample);
+  if (HostClock::now() >= next_line_) {
+    next_line_ = next_line_ + Duration{kLineInterval};
+    link_.refresh_clock();
+    if (!options_.quiet) print_live();
+  }
+}
+
+/// All axes from one time: the reference's, as the steered clock knows it. Two by two on a circle.
+void MainRunner::move_axes() {
+  const bool moving = figures_.op_cycle >= 0 && options_.move;
+  const double time = servo_->next_trigger().local.since_epoch().seconds();
+  const double angle = 2.0 * std::numbers::pi * std::fmod(time, kTurn_s) / kTurn_s;
+  const bool all_enabled = std::all_of(
+      axes_.begin(), axes_.end(),
+      [](const ethercat::CspAxis& axis) { return axis.state() == ethercat::AxisState::kEnabled; });
+  if (!all_enabled) moving_since_ = figures_.cycles;
+  // The radius grows from zero, so that nobody jumps.
+  const double grown =
+      static_cast<double>(figures_.cycles - moving_since_) / static_cast<double>(1000);
+  const double radius = kRadius * std::min(1.0, grown);
+  for (std::size_t n = 0; n < axes_.size(); ++n) {
+    const auto outputs = main_->outputs(n);
+    const auto inputs = main_->inputs(n);
+    if (outputs.size() < ethercat::csp::kOutputSize) continue;
+    if (inputs.size() < ethercat::csp::kInputSize) continue;
+    const double offset = radius * (n % 2 == 0 ? std::cos(angle) : std::sin(angle));
+    axes_[n]
+        .cycle(ethercat::csp::Inputs::decode(inputs),
+               {.enable = moving,
+                .reset_fault = figures_.cycles % 2 == 0,
+                .displacement = static_cast<std::int32_t>(std::lround(offset))})
+        .encode(outputs);
+  }
+}
+
+void MainRunner::note(const CycleSample& sample, bool answered) {
+  ++figures_.cycles;
+  figures_.host_stalls += decision_.skipped;
+  if (answered && main_->last_cycle().inputs_valid) ++figures_.working_counter_right;
+  const bool locked = decision_.state == CycleState::kLocked;
+  if (locked && figures_.lock_cycle < 0) {
+    figures_.lock_cycle = static_cast<std::int64_t>(figures_.cycles);
+  }
+  if (figures_.lock_cycle < 0) return;
+  figures_.lateness.add(decision_.lateness.ns());
+  if (decision_.verdict == CycleVerdict::kLate || decision_.verdict == CycleVerdict::kSlow) {
+    ++figures_.excluded;
+    return;
+  }
+  if (decision_.verdict != CycleVerdict::kUsed) return;
+  ++figures_.judged;
+  figures_.phase.add(decision_.phase_error.ns());
+  figures_.wire_phase.add((decision_.lateness - decision_.phase_error).ns());
+  figures_.round_trip.add((sample.received - sample.sent).ns());
+  const auto cycle = options_.servo.cycle.count();
+  const auto until_sync0 =
+      static_cast<std::int64_t>(main_->sync0_start()) - sample.reference.since_epoch().rounded_ns();
+  figures_.margin.add(static_cast<double>(((until_sync0 % cycle) + cycle) % cycle));
+  const auto second = 1'000'000'000 / cycle;
+  if (static_cast<std::int64_t>(figures_.cycles) > figures_.lock_cycle + second) {
+    figures_.worst_difference_ns =
+        std::max(figures_.worst_difference_ns, main_->last_cycle().difference_bound_ns);
+  }
+}
+
+/// OP once the cycle is locked; a SubDevice that left it is acknowledged and asked again.
+void MainRunner::supervise() {
+  if (figures_.op_cycle < 0 && main_->last_cycle().all_operational()) {
+    figures_.op_cycle = static_cast<std::int64_t>(figures_.cycles);
+  }
+  if (decision_.state != CycleState::kLocked || main_->last_cycle().all_operational()) return;
+  const bool first = asked_at_ == 0;
+  if (first) main_->request_operational();
+  if (first) asked_at_ = figures_.cycles;
+  constexpr std::uint64_t kCyclesBetweenRecoveries = 100;
+  const std::uint64_t since = figures_.cycles - asked_at_;
+  if (since < kCyclesBetweenRequests || since % kCyclesBetweenRecoveries != 0) return;
+  for (std::size_t n = 0; n < main_->network().count; ++n) main_->recover(n);
+}
+
+void MainRunner::print_live() const {
+  const ethercat::CycleReport& report = main_->last_cycle();
+  const double rate = decision_.rate.ratio();
+  fmt::print(
+      "margin {:7.1f} us  {:9}  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle {:.6f} ms  "
+      "wkc {}/{}  al 0x{:02X}  |0x092C| < {} ns  lost {}  late {}\n",
+      figures_.margin.quantile(0.5) * 1e-3,
+      decision_.state == CycleState::kLocked      ? "locked"
+      : decision_.state == CycleState::kAcquiring ? "acquiring"
+      : decision_.state == CycleState::kCoasting  ? "coasting"
+                                                  : "waiting",
+      decision_.phase_error.ns() * 1e-3, decision_.rate.ppm(),
+      static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
+      report.expected, report.states, report.difference_bound_ns + 1, main_->counters().lost,
+      servo_->counters().late);
+  std::fflush(stdout);
+}
+
+void MainRunner::write_csv(const CycleSample& sample) {
+  const auto cycle = options_.servo.cycle.count();
+  const auto until_sync0 =
+      static_cast<std::int64_t>(main_->sync0_start()) - sample.reference.since_epoch().rounded_ns();
+  fmt::print(csv_.get(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{}\n", figures_.cycles,
+             static_cast<int>(decision_.state), static_cast<int>(decision_.verdict),
+             decision_.phase_error.ns(), decision_.lateness.ns(),
+             (sample.received - sample.sent).ns(), decision_.rate.ppb(),
+             main_->last_cycle().working_counter, ((until_sync0 % cycle) + cycle) % cycle);
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ftcs/analysis/quantile_sketch.h"
+#include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/ethercat/maindevice/csp_axis.h"
+#include "ftcs/ethercat/maindevice/main_device.h"
+#include "ftcs/platform/ethercat_link.h"
+
+namespace ftcs::app {
+
+struct RunOptions {
+  std::string interface;  ///< raw Ethernet; empty: UDP
+  std::string host = "127.0.0.1";
+  std::uint16_t port = ethercat::kUdpPort;
+  std::size_t drives = 0;  ///< expected at least
+  CycleServoConfig servo;
+  double sync0_phase = 0.5;  ///< SYNC0 comes this part of a cycle after the frame
+  std::uint32_t drift_pulses = 15000;
+  double duration_s = 10.0;  ///< of the cyclic part; zero: until a signal
+  Nanoseconds spin{0};
+  int priority = 80;
+  int cpu = -1;
+  bool move = true;  ///< the axes draw circles, two by two
+  bool quiet = false;
+  std::string json;
+  std::string csv;
+};
+
+/// What a run showed. Times in ns.
+struct RunFigures {
+  std::uint64_t cycles = 0;
+  std::uint64_t judged = 0;    ///< cycles within the gates after the lock: the figures below
+  std::uint64_t excluded = 0;  ///< late or slow ones after the lock
+  std::uint64_t working_counter_right = 0;
+  std::uint64_t host_stalls = 0;  ///< cycles passed over
+  std::int64_t lock_cycle = -1;
+  std::int64_t op_cycle = -1;
+  std::uint32_t worst_difference_ns = 0;  ///< bound of |0x092C|, from one second after the lock on
+  QuantileSketch lateness;
+  QuantileSketch phase;
+  QuantileSketch wire_phase;  ///< of the frame itself, lateness included
+  QuantileSketch round_trip;
+  QuantileSketch margin;  ///< SYNC0 minus arrival
+};
+
+/// Drives a MainDevice and a cycle servo over a link: bring-up, cyclic exchange, motion, report.
+class MainRunner {
+ public:
+  MainRunner(const RunOptions& options, platform::EthercatLink link);
+  /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).
+  bool bring_up(const std::function<bool()>& stop, bool scan_only);
+  /// The cyclic part.
+  void run(const std::function<bool()>& stop);
+
+  [[nodiscard]] const ethercat::MainDevice& main() const { return *main_; }
+  [[nodiscard]] const RunFigures& figures() const { return figures_; }
+  [[nodiscard]] const CycleDecision& decision() const { return decision_; }
+  [[nodiscard]] const CycleServoCounters& servo_counters() const { return servo_->counters(); }
+  [[nodiscard]] const RunOptions& options() const { return options_; }
+  [[nodiscard]] const std::vector<ethercat::CspAxis>& axes() const { return axes_; }
+
+ private:
+  /// One frame there and back; false if none came.
+  bool exchange(FreeRunningTime deadline, CycleSample* sample);
+  void cycle();
+  void move_axes();
+  void note(const CycleSample& sample, bool answered);
+  void supervise();
+  void print_live() const;
+  void write_csv(const CycleSample& sample);
+
+  RunOptions options_;
+  platform::EthercatLink link_;
+  std::unique_ptr<ethercat::MainDevice> main_;
+  std::unique_ptr<CycleServo> servo_;
+  std::vector<ethercat::SdoDownload> objects_;
+  std::vector<ethercat::CspAxis> axes_;
+  CycleDecision decision_;
+  RunFigures figures_;
+  FreeRunningTime next_line_;
+  std::uint64_t asked_at_ = 0;  ///< cycle in which OP was asked for
+  std::uint64_t moving_since_ = 0;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> csv_{nullptr, std::fclose};
+};
+
+void print_scan(const ethercat::MainDevice& main);
+/// One or two lines for the user: what failed, where, and what was expected.
+[[nodiscard]] std::string describe(const ethercat::Failure& failure);
+void print_run(const MainRunner& runner);
+[[nodiscard]] std::string run_json(const MainRunner& runner);
+
+}  // namespace ftcs::app

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/ethercat/segment_server.h"
+#include "apps/ftcs/units.h"
+#include "ftcs/platform/stop_flag.h"
+#include "ftcs/report/write_file.h"
+
+namespace ftcs::app {
+
+namespace {
+
+struct SegmentArguments {
+  SegmentOptions options;
+  std::string udp;
+  std::string topology = "line";
+  std::string cable;
+  std::string hop;
+  std::vector<std::string> faults;
+  int priority = 0;
+  int cpu = -1;
+};
+
+/// "KIND:DRIVE@SECONDS" or "skew:DRIVE@SECONDS=PPM".
+std::optional<std::string> parse_fault(const std::string& text, SegmentFault& fault) {
+  const auto wrong = [&text] {
+    return fmt::format(
+        "--fault: '{}' is not cut, mend, restart or skew, as in cut:3@2.5 or "
+        "skew:0@4=100",
+        text);
+  };
+  const std::size_t colon = text.find(':');
+  const std::size_t at = text.find('@');
+  if (colon == std::string::npos || at == std::string::npos || at < colon) return wrong();
+  const std::string kind = text.substr(0, colon);
+  const std::size_t equals = text.find('=', at);
+  const auto device = parse_integer(text.substr(colon + 1, at - colon - 1), 0, 63);
+  const std::size_t end = equals == std::string::npos ? text.size() : equals;
+  const auto seconds = parse_number(text.substr(at + 1, end - at - 1), 0.0, 1e9);
+  if (!device || !seconds) return wrong();
+  fault.device = static_cast<std::size_t>(*device);
+  fault.at_s = *seconds;
+  if (kind == "skew" && equals != std::string::npos) {
+    const auto ppm = parse_number(text.substr(equals + 1), -1e5, 1e5);
+    if (!ppm) return wrong();
+    fault.kind = SegmentFault::Kind::kSkew;
+    fault.ppm = *ppm;
+    return std::nullopt;
+  }
+  if (equals != std::string::npos) return wrong();
+  if (kind == "cut") {
+    fault.kind = SegmentFault::Kind::kCut;
+  } else if (kind == "mend") {
+    fault.kind = SegmentFault::Kind::kMend;
+  } else if (kind == "restart") {
+    fault.kind = SegmentFault::Kind::kRestart;
+  } else {
+    return wrong();
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> complete(SegmentArguments& arguments) {
+  SegmentOptions& options = arguments.options;
+  options.tree = arguments.topology == "tree";
+  if (!arguments.udp.empty()) {
+    const std::size_t colon = arguments.udp.rfind(':');
+    const std::string port =
+        colon == std::string::npos ? arguments.udp : arguments.udp.substr(colon + 1);
+    if (colon != std::string::npos) options.address = arguments.udp.substr(0, colon);
+    const auto number = parse_integer(port, 1, 65535);
+    if (!number) return "--udp: " + number.error().message;
+    options.port = static_cast<std::uint16_t>(*number);
+  }
+  for (const auto& [text, target] :
+       {std::pair{&arguments.cable, &options.cable}, std::pair{&arguments.hop, &options.hop}}) {
+    if (text->empty()) continue;
+    const auto value = parse_duration(*text);
+    if (!value || *value < Duration{}) return fmt::format("'{}' is no delay, as in 50ns", *text);
+    *target = Nanoseconds{value->floor_ns()};
+  }
+  for (const std::string& text : arguments.faults) {
+    SegmentFault fault;
+    if (auto wrong = parse_fault(text, fault)) return wrong;
+    options.faults.push_back(fault);
+  }
+  return std::nullopt;
+}
+
+int run_segment(SegmentArguments arguments) {
+  if (const auto wrong = complete(arguments)) {
+    fmt::print(stderr, "ftcs ethercat-segment: {}\n", *wrong);
+    return kUsageError;
+  }
+  const SegmentOptions& options = arguments.options;
+  auto link = options.interface.empty()
+                  ? platform::EthercatLink::listen_udp(options.address, options.port)
+                  : platform::EthercatLink::open_raw(options.interface);
+  if (!link) {
+    fmt::print(stderr, "ftcs ethercat-segment: {}\n", link.error().message());
+    return kRuntimeError;
+  }
+  if (arguments.priority > 0) {
+    static_cast<void>(platform::make_realtime(arguments.priority, arguments.cpu));
+  }
+  SegmentServer server(options, std::move(*link));
+  fmt::print("{} drives in a {} on {}\n", options.drives, arguments.topology,
+             options.interface.empty() ? fmt::format("UDP {}:{}", options.address, options.port)
+                                       : options.interface);
+  std::fflush(stdout);
+  const platform::StopFlag stop;
+  server.run([&stop] { return stop.is_set(); });
+  server.print_summary();
+  if (options.json.empty()) return kSuccess;
+  if (const auto error = write_file(options.json, server.json())) {
+    fmt::print(stderr, "ftcs ethercat-segment: {}\n", error->message);
+    return kRuntimeError;
+  }
+  return kSuccess;
+}
+
+}  // namespace
+
+void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand(
+      "ethercat-segment", "a software EtherCAT segment of CiA 402 drives with distributed clocks");
+  const auto arguments = std::make_shared<SegmentArguments>();
+  SegmentOptions& options = arguments->options;
+  auto* interface = command->add_option("-i,--interface", options.interface,
+                                        "raw Ethernet on this interface (needs CAP_NET_RAW)");
+  command->add_option("--udp", arguments->udp, "[ADDRESS:]PORT; default 127.0.0.1:34980")
+      ->excludes(interface);
+  command->add_option("--drives", options.drives, "how many")->check(CLI::Range(1, 64));
+  command->add_option("--ppm", options.ppm, "crystal of each drive; the last two take turns")
+      ->delimiter(',');
+  command->add_option("--random-walk-ppb", options.random_walk_ppb,
+                      "random walk of the crystals, ppb per square root of a second");
+  command->add_option("--topology", arguments->topology, "line (default) or tree")
+      ->check(CLI::IsMember({"line", "tree"}));
+  command->add_option("--cable", arguments->cable, "delay of each cable; default 50ns");
+  command->add_option("--hop", arguments->hop, "delay in each SubDevice; default 300ns");
+  command->add_option("--drop", options.drop, "share of frames to lose")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--fault", arguments->faults,
+                      "cut:N@S, mend:N@S, restart:N@S or skew:N@S=PPM; may be repeated");
+  command->add_option("--seed", options.seed, "of crystals and losses");
+  command->add_option("--duration", options.duration_s, "stop after so many seconds");
+  command->add_option("--priority", arguments->priority, "SCHED_FIFO priority")
+      ->check(CLI::Range(0, 99));
+  command->add_option("--cpu", arguments->cpu, "pin to this processor");
+  command->add_option("--json", options.json, "write what the drives saw to this file");
+  command->callback([arguments, &exit_code] { exit_code = run_segment(*arguments); });
+}
+
+}  // namespace ftcs::app

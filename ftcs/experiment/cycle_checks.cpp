@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include "ftcs/experiment/cycle_experiment.h"
+
+namespace ftcs::experiment {
+
+namespace {
+
+/// Collects demands on the rows of Table 6.
+class Judge {
+ public:
+  explicit Judge(std::vector<PaperCheckResult>& checks) : checks_(checks) {}
+
+  void within(const char* name, const CycleRow& row, const char* against, double expected,
+              double tolerance, double measured) {
+    if (std::isnan(expected)) return;
+    limits(name, row, against, expected - std::abs(expected) * tolerance,
+           expected + std::abs(expected) * tolerance, measured);
+    checks_.back().expected = expected;
+  }
+  void limits(const char* name, const CycleRow& row, const char* against, double least, double most,
+              double measured) {
+    PaperCheckResult check;
+    check.name = name;
+    check.subject = row.name;
+    check.against = against;
+    check.least = least;
+    check.most = most;
+    check.measured = measured;
+    check.passed = !(measured < least) && !(measured > most) && !std::isnan(measured);
+    checks_.push_back(check);
+  }
+
+ private:
+  std::vector<PaperCheckResult>& checks_;
+};
+
+void judge_row(Judge& judge, const CycleRow& row, const CycleSeedRun& figures) {
+  if (row.servo.law == CycleLaw::kAdaptive) {
+    const bool coarse = row.world.resolution > Nanoseconds{1};
+    const double limit = coarse ? 3000.0 : 400.0;
+    judge.limits("rms of the event", row, "bound", 0.0, limit, figures.rms_event_ns);
+    judge.limits("rms of the virtual trigger", row, "bound", 0.0, 400.0, figures.rms_virtual_ns);
+    return;
+  }
+  if (row.servo.law == CycleLaw::kFtcs) {
+    judge.within("deviation about the mean", row, "model", row.model_deviation_ns, 0.02,
+                 figures.deviation_perceived_ns);
+    judge.within("deviation about the mean", row, "paper", row.paper_rms_ns, 0.07,
+                 figures.deviation_perceived_ns);
+  } else {
+    judge.within("median rms", row, "model", row.model_rms_ns, 0.03, figures.rms_perceived_ns);
+    judge.within("median rms", row, "paper", row.paper_rms_ns, 0.08, figures.rms_perceived_ns);
+  }
+  judge.within("median minimum", row, "model", row.model_min_ns, 0.05, figures.minimum_ns);
+  judge.within("median maximum", row, "model", row.model_max_ns, 0.05, figures.maximum_ns);
+  judge.within("median minimum", row, "paper", row.paper_min_ns, 0.15, figures.minimum_ns);
+  judge.within("median maximum", row, "paper", row.paper_max_ns, 0.15, figures.maximum_ns);
+  if (std::isnan(row.paper_cycles)) return;
+  const bool ftcs = row.servo.law == CycleLaw::kFtcs;
+  const double model = ftcs ? 0.0 : 1.0;
+  const double paper = ftcs ? 0.0 : 2.0;
+  judge.limits("cycles to converge", row, "model", row.model_cycles - model,
+               row.model_cycles + model, figures.cycles);
+  judge.limits("cycles to converge", row, "paper", row.paper_cycles - paper,
+               row.paper_cycles + paper, figures.cycles);
+}
+
+}  // namespace
+
+std::vector<PaperCheckResult> judge_table6(const CycleResult& result) {
+  std::vector<PaperCheckResult> checks;
+  Judge judge(checks);
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    judge_row(judge, result.rows[i], result.figures[i].median);
+  }
+  return checks;
+}
+
+std::vector<PaperChoice> table6_choices() {
+  return {
+      {"cycles per second", "47", "fits all five rows; 20 ms (50) is the natural number"},
+      {"jitter of a reading", "1 us", "fitted with it"},
+      {"rate of the local clock", "20 ppm, ±1 ppm between runs", "fitted: the beat with the tick"},
+      {"samples", "30 to settle, 200 measured", "consistent with the spread of the PICS rows"},
+      {"switch to p = 0", "|E| < 2 us; back at B = 20 us", "Table 1: after some time inside B"},
+      {"start", "measured runs: right rate, within a tick; convergence: nominal rate, 300 us",
+       "the text gives none; from 200 us PICS5 takes 18 intervals, from 300 us the printed 20"},
+      {"RMS of FTCS", "about its own mean",
+       "with p = 0 the mean is frozen by the last step of eq. 18; the paper's runs had little"},
+  };
+}
+
+}  // namespace ftcs::experiment

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/time/instant.h"
+
+namespace ftcs::platform {
+
+/// CLOCK_MONOTONIC as the free-running clock of a cyclic task, because it is the one that
+/// clock_nanosleep() wakes by; and what a kernel stamp (CLOCK_REALTIME) is on it. Both are slewed
+/// alike: only a step of CLOCK_REALTIME changes their difference, and it is measured again at each
+/// refresh().
+class HostClock {
+ public:
+  HostClock() noexcept { refresh(); }
+  [[nodiscard]] static FreeRunningTime now() noexcept;
+  [[nodiscard]] FreeRunningTime from_realtime(std::int64_t realtime_ns) const noexcept {
+    return FreeRunningTime::from_ns(realtime_ns - realtime_ahead_ns_);
+  }
+  /// Measures the difference: tightest of a few bracketed readings.
+  void refresh() noexcept;
+  /// Sleeps until `spin` before the instant and turns in a circle for the rest.
+  static void wait_until(FreeRunningTime instant, Nanoseconds spin) noexcept;
+
+ private:
+  std::int64_t realtime_ahead_ns_ = 0;
+  bool known_ = false;
+};
+
+/// What a cyclic task asked of the system, and what it got.
+struct RealtimeSetup {
+  bool memory_locked = false;
+  bool priority_set = false;
+  bool pinned = false;
+  bool latency_held = false;  ///< /dev/cpu_dma_latency is held at zero
+};
+
+/// SCHED_FIFO at `priority` (0: leave it), memory locked, pinned to `cpu` (-1: leave it), processor
+/// sleep states held off as long as the program lives. Nothing is an error: what was refused is
+/// false.
+[[nodiscard]] RealtimeSetup make_realtime(int priority, int cpu) noexcept;
+
+}  // namespace ftcs::platform

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/report/cycle_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "ftcs/report/html_report.h"
+#include "ftcs/report/number_format.h"
+
+namespace ftcs {
+namespace {
+
+using experiment::CycleResult;
+using experiment::CycleRow;
+using experiment::CycleSeedRun;
+using experiment::PaperCheckResult;
+
+constexpr const char* kTitle = "Table 6: EtherCAT main device on a timer of 10 us";
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+bool row_passed(const CycleResult& result, const CycleRow& row) {
+  return std::all_of(
+      result.checks.begin(), result.checks.end(),
+      [&row](const PaperCheckResult& check) { return check.subject != row.name || check.passed; });
+}
+
+Json row_json(const CycleResult& result, std::size_t i) {
+  const CycleRow& row = result.rows[i];
+  const CycleSeedRun& median = result.figures[i].median;
+  return Json{{"row", row.name},
+              {"paper_rms_ns", number(row.paper_rms_ns)},
+              {"rms_perceived_offset_ns", number(median.rms_perceived_ns)},
+              {"median_rms_ns", number(median.rms_perceived_ns)},
+              {"std_perceived_offset_ns", number(median.deviation_perceived_ns)},
+              {"min_ns", number(median.minimum_ns)},
+              {"max_ns", number(median.maximum_ns)},
+              {"rms_event_error_ns", number(median.rms_event_ns)},
+              {"rms_virtual_error_ns", number(median.rms_virtual_ns)},
+              {"rms_time_error_ns", number(median.rms_virtual_ns)},
+              {"predicted_rms_ns", number(row.model_deviation_ns)},
+              {"paper_cycles", number(row.paper_cycles)},
+              {"cycles_to_converge", number(median.cycles)},
+              {"passed", row_passed(result, row)},
+              {"note", row.note},
+              {"model_rms_ns", number(row.model_rms_ns)},
+              {"paper_min_ns", number(row.paper_min_ns)},
+              {"paper_max_ns", number(row.paper_max_ns)},
+              {"percentile_5_ns", number(result.figures[i].percentile_5_ns)},
+              {"percentile_95_ns", number(result.figures[i].percentile_95_ns)},
+              {"cycles_from_first_message", number(median.cycles_from_first_message)},
+              {"runs", result.figures[i].runs.size()}};
+}
+
+Table checks_table(const CycleResult& result) {
+  Table table({"check", "row", "against", "demanded", "measured", ""});
+  for (const PaperCheckResult& check : result.checks) {
+    table.add_row({check.name, check.subject, check.against,
+                   fmt::format("{} .. {}", significant(check.least), significant(check.most)),
+                   Cell::significant(check.measured, 5), check.passed ? "ok" : "FAILED"});
+  }
+  return table;
+}
+
+Table choices_table(const CycleResult& result) {
+  Table table({"the paper does not say", "chosen", "because"});
+  for (const auto& choice : result.choices) {
+    table.add_row({choice.parameter, choice.value, choice.reason});
+  }
+  return table;
+}
+
+Plot figure_plot(const CycleResult& result) {
+  Plot plot;
+  plot.title = "figure7: perceived error of the cycle, first seed";
+  plot.x_label = "sync interval";
+  plot.y_label = "early is positive / ns";
+  for (const auto& trace : result.traces) {
+    PlotSeries series;
+    series.name = trace.row;
+    for (std::size_t n = 0; n < trace.perceived_ns.size(); ++n) {
+      series.x.push_back(static_cast<double>(n));
+      series.y.push_back(trace.perceived_ns[n]);
+    }
+    plot.series.push_back(series);
+  }
+  return plot;
+}
+
+constexpr const char* kRemark =
+    "RMS: of one run of 200 intervals, median over seeds. Perceived: what the servo saw. Event: "
+    "the "
+    "trigger on its tick; no servo can be under 10 us / sqrt(12) = 2887 ns. Virtual: the trigger "
+    "without its tick.";
+
+}  // namespace
+
+Table cycle_table(const CycleResult& result) {
+  Table table({"row", "paper RMS / ns", "RMS / ns", "std / ns", "min / ns", "max / ns",
+               "event RMS / ns", "virtual RMS / ns", "cycles, paper", "cycles"});
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    const CycleSeedRun& median = result.figures[i].median;
+    table.add_row({result.rows[i].name, Cell::significant(result.rows[i].paper_rms_ns),
+                   Cell::significant(median.rms_perceived_ns),
+                   Cell::significant(median.deviation_perceived_ns),
+                   Cell::significant(median.minimum_ns), Cell::significant(median.maximum_ns),
+                   Cell::significant(median.rms_event_ns), Cell::significant(median.rms_virtual_ns),
+                   Cell::significant(result.rows[i].paper_cycles),
+                   Cell::significant(median.cycles)});
+  }
+  return table;
+}
+
+std::string cycle_console(const CycleResult& result) {
+  return fmt::format("{}\n{} seeds\n\n{}\n{}\n\n{}\n{}", kTitle, result.seeds,
+                     cycle_table(result).to_text(), kRemark, choices_table(result).to_text(),
+                     checks_table(result).to_text());
+}
+
+Json cycle_json(const CycleResult& result, const std::string& version) {
+  Json rows = Json::array();
+  Json support = Json::array();
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    (result.rows[i].support ? support : rows).push_back(row_json(result, i));
+  }
+  Json checks = Json::array();
+  for (const PaperCheckResult& check : result.checks) {
+    checks.push_back({{"table", "table6"},
+                      {"name", check.name},
+                      {"subject", check.subject},
+                      {"against", check.against},
+                      {"expected", number(check.expected)},
+                      {"least", number(check.least)},
+                      {"most", number(check.most)},
+                      {"measured", number(check.measured)},
+                      {"demanded", check.demanded},
+                      {"passed", check.passed},
+                      {"note", check.note}});
+  }
+  Json choices = Json::array();
+  for (const auto& choice : result.choices) {
+    choices.push_back({{"table", "table6"},
+                       {"parameter", choice.parameter},
+                       {"value", choice.value},
+                       {"reason", choice.reason}});
+  }
+  Json traces = Json::array();
+  for (const auto& trace : result.traces) {
+    traces.push_back(
+        {{"row", trace.row}, {"seed", 1}, {"perceived_offset_ns", trace.perceived_ns}});
+  }
+  return Json{{"program", "ftcs"},
+              {"version", version},
+              {"passed", result.passed()},
+              {"tables", {{"table6", std::move(rows)}}},
+              {"checks", std::move(checks)},
+              {"choices", std::move(choices)},
+              {"support", {{"table6", std::move(support)}}},
+              {"figures", {{"figure7", std::move(traces)}}}};
+}
+
+std::string cycle_html(const CycleResult& result, const std::string& version) {
+  HtmlReport report("Frequency-tracking clock servo: Section V regenerated",
+                    "Chen et al., IEEE Access 5 (2017), DOI 10.1109/ACCESS.2017.2715878");
+  report.add_table(kTitle, cycle_table(result), fmt::format("{} seeds", result.seeds));
+  report.add_note(kRemark);
+  report.add_plot(figure_plot(result));
+  report.add_table("Choices", choices_table(result));
+  report.add_table("Checks", checks_table(result));
+  report.add_parameters({{"version", version}});
+  return report.render();
+}
+
+}  // namespace ftcs

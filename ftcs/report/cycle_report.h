@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "ftcs/experiment/cycle_experiment.h"
+#include "ftcs/report/json.h"
+#include "ftcs/report/table.h"
+
+namespace ftcs {
+
+/// Table 6 of the paper beside ours: perceived, event and virtual error of each row.
+[[nodiscard]] Table cycle_table(const experiment::CycleResult& result);
+[[nodiscard]] std::string cycle_console(const experiment::CycleResult& result);
+/// {"version", "passed", "tables": {"table6": [...]}, "checks", "choices", "figures": {"figure7"}}.
+[[nodiscard]] Json cycle_json(const experiment::CycleResult& result, const std::string& version);
+[[nodiscard]] std::string cycle_html(const experiment::CycleResult& result,
+                                     const std::string& version);
+
+}  // namespace ftcs
