@@ -43,6 +43,7 @@ Telemetry ClockDiscipline::on_pair(const EventPair& event) noexcept {
 Telemetry ClockDiscipline::on_silence() noexcept {
   const ClockReading now = clock_.read();
   begin(now);
+  if (telemetry_.servo.offset_known) telemetry_.servo = servo_.snapshot_at(now);
   check_silence(now);
   return finish();
 }

@@ -214,14 +214,16 @@ template <class Grid>
 void Estimator<Grid>::gather_evidence(const Innovations& innovations) noexcept {
   const double s2 = scale_ * scale_;
   const double log_s2 = quick_log(s2);
+  // The credit of the best model, for all: a model that rejected every message as an outlier would
+  // otherwise gather no squares and look perfect.
+  const double credit = innovations.credit[best_];
   for (std::size_t i = 0; i < kSize; ++i) {
     const double variance = innovations.variance[i];
     const double centred = innovations.centred[i];
-    const double credit = innovations.credit[i];
     squares_[i] += credit * std::min(centred * centred / variance, kEvidenceLimit) * s2;
     logs_[i] += credit * (innovations.log_variance[i] - log_s2);
   }
-  weight_sum_ += innovations.credit[best_];
+  weight_sum_ += credit;
 }
 
 template <class Grid>

@@ -90,6 +90,13 @@ const std::vector<Row>& rows() {
       {"frequency sine, 1 s", with(1.0, [](S& s) { s.sine_ppm = 0.5; }), 95, 105},
       {"frequency sine, 125 ms", with(0.125, [](S& s) { s.sine_ppm = 0.5; }), 58, 65},
       {"one-way load, 1 s", with(1.0, [](S& s) { s.forward_load_ns = 1000; }), 40, 60},
+      {"15 us longer path, earlier",
+       with(1.0,
+            [](S& s) {
+              s.path_step_ns = 15000;
+              s.event_cycle = 600;
+            }),
+       20, 40, 1000, 1000},
       {"15 us longer path, 1 s", with(1.0, [](S& s) { s.path_step_ns = 15000; }), 20, 40, 1000,
        1000},
   };
