@@ -45,7 +45,8 @@ struct FtcsConfig {
 /// path delay (eq. 10 with d_rl unchanged), so that it cancels. T_offset = -offset, projected from
 /// the sample to the moment at which the command takes effect, and the correction ends T_c after
 /// the sample (Fig. 3), not after the command; without latency this is the paper to the letter. The
-/// first command comes with the second sample. Never steps.
+/// first command comes with the second sample; after an outage of more than four intervals it is
+/// eq. (18) again. Never steps.
 class FtcsServo {
  public:
   using Config = FtcsConfig;
@@ -65,9 +66,11 @@ class FtcsServo {
   struct State {
     Phase phase = Phase::kEmpty;
     SampleInstant previous{};
+    Duration last_interval{};  ///< between the last two samples; zero: there were none
     ConvergenceLatch converged{};
   };
 
+  [[nodiscard]] Duration sync_interval(const SampleProgress& progress) const noexcept;
   [[nodiscard]] double gain_for(double offset_ns) noexcept;
   [[nodiscard]] ServoUpdate steer(const SyncSample& sample, const ClockReading& now,
                                   const SampleProgress& progress) noexcept;

@@ -265,7 +265,32 @@ TEST(FtcsServo, measures_the_interval_when_none_is_configured) {
   const SyncSample after_a_gap = sample_at(400'000, 400'000);
   (void)servo.update(first, at(first));
   EXPECT_EQ(servo.update(second, at(second)).command.correction_time, Duration{80us});
-  EXPECT_EQ(servo.update(after_a_gap, at(after_a_gap)).command.correction_time, Duration{320us});
+  // A lost message does not make the interval longer.
+  EXPECT_EQ(servo.update(after_a_gap, at(after_a_gap)).command.correction_time, Duration{80us});
+}
+
+TEST(FtcsServo, removes_what_an_outage_left_with_full_weight) {
+  for (const Nanoseconds configured : {kInterval, Nanoseconds{0}}) {
+    AffinePlant plant{1.0L, 0ns};
+    FtcsConfig config = with_gain(1.0 / 16.0);
+    config.sync_interval = configured;
+    FtcsServo servo{config};
+    for (int i = 0; i < 4; ++i) {
+      step(servo, plant);
+      plant.advance_reference(kInterval);
+    }
+    plant.advance_reference(Duration{375ms});  // four intervals: messages were lost, no more
+    step(servo, plant);
+    EXPECT_EQ(servo.snapshot().offset_gain, 1.0 / 16.0);
+    plant.advance_reference(kInterval);
+    step(servo, plant);
+    plant.advance_reference(Duration{501ms});
+    step(servo, plant);
+    EXPECT_EQ(servo.snapshot().offset_gain, 1.0);
+    plant.advance_reference(kInterval);
+    step(servo, plant);
+    EXPECT_EQ(servo.snapshot().offset_gain, 1.0 / 16.0);
+  }
 }
 
 TEST(FtcsServo, lands_in_spite_of_missing_samples_and_irregular_intervals) {
