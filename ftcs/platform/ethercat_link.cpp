@@ -101,9 +101,16 @@ Result<EthercatLink, OsError> EthercatLink::open_raw(const std::string& interfac
   EthercatLink link(fd, true);
   ifreq request{};
   std::copy(interface.begin(), interface.end(), request.ifr_name);
-  if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) return os_error(errno, "interface " + interface);
-  if ((request.ifr_flags & IFF_UP) == 0) {
-    return OsError{OsErrorKind::kInterfaceDown, ENETDOWN, "interface " + interface};
+  // A link that was just brought up has its carrier reported late.
+  constexpr int kTries = 20;
+  constexpr useconds_t kPause_us = 100'000;
+  for (int i = 0; i < kTries; ++i) {
+    if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) return os_error(errno, "interface " + interface);
+    if ((request.ifr_flags & IFF_UP) == 0) {
+      return OsError{OsErrorKind::kInterfaceDown, ENETDOWN, "interface " + interface};
+    }
+    if ((request.ifr_flags & IFF_RUNNING) != 0) break;
+    usleep(kPause_us);
   }
   if ((request.ifr_flags & IFF_RUNNING) == 0) {
     return OsError{OsErrorKind::kInterfaceDown, ENETDOWN, "no carrier on interface " + interface};
