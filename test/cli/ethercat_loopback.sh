@@ -1,0 +1,54 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# A segment and a MainDevice as processes, UDP on loopback, no root: scan, OP, lock, figures, clear errors. Judges behaviour,
+# not timing: the machine may be busy.
+set -uo pipefail
+
+ftcs=$(realpath "${1:-build/ftcs}")
+folder=$(mktemp -d)
+segment=
+cleanup() {
+  [ -n "$segment" ] && kill "$segment" 2> /dev/null
+  wait 2> /dev/null
+  rm -rf "$folder"
+}
+trap cleanup EXIT
+
+fail() {
+  echo "FAILED: $*"
+  for log in "$folder"/*; do echo "--- $(basename "$log")"; tail -n 15 "$log"; done
+  exit 1
+}
+
+port=$((30000 + $$ % 5000))
+to=(--udp "127.0.0.1:$port")
+
+"$ftcs" ethercat scan "${to[@]}" > "$folder/nobody" 2>&1
+[ $? -eq 1 ] || fail "nobody there: expected exit code 1"
+grep -q "no reply" "$folder/nobody" || fail "nobody there: no clear error"
+"$ftcs" ethercat scan -i no-such-if > "$folder/interface" 2>&1
+[ $? -eq 1 ] || fail "wrong interface: expected exit code 1"
+"$ftcs" ethercat run --cycle 3x > "$folder/usage" 2>&1
+[ $? -eq 2 ] || fail "wrong duration: expected exit code 2"
+
+"$ftcs" ethercat-segment --udp "$port" --drives 8 --json "$folder/segment.json" > "$folder/segment" 2>&1 &
+segment=$!
+sleep 0.5
+"$ftcs" ethercat scan "${to[@]}" > "$folder/scan" 2>&1 || fail "scan"
+[ "$(grep -c "modelled servo drive" "$folder/scan")" -eq 8 ] || fail "scan: expected eight drives"
+grep -q "delay 24[0-9][0-9] ns" "$folder/scan" || fail "scan: the last of eight is 7 x 350 ns away"
+"$ftcs" ethercat run "${to[@]}" --drives 9 > "$folder/fewer" 2>&1
+[ $? -eq 1 ] || fail "fewer drives than expected: exit code 1"
+grep -q "expected 9, found 8" "$folder/fewer" || fail "fewer drives: no clear error"
+
+# 4 ms leave a busy machine time to answer.
+"$ftcs" ethercat run "${to[@]}" --drives 8 --cycle 4ms --sync-interval 200ms --gate 1ms --duration 6 \
+  --drift-pulses 500 --json "$folder/run.json" > "$folder/run" 2>&1
+code=$?
+[ $code -eq 0 ] || [ $code -eq 3 ] || fail "run: exit code $code"
+grep -q '"op_cycle": [0-9]' "$folder/run.json" || fail "run: the drives did not reach OP"
+kill -INT "$segment"
+wait "$segment" || fail "segment: exit code $?, expected 0 after SIGINT"
+segment=
+grep -q '"sync0_events": [1-9]' "$folder/segment.json" || fail "segment: no SYNC0 in OP"
+echo "ok"
