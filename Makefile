@@ -43,6 +43,7 @@ bench: deps-test
 	@cmake --build build-release -j $(JOBS)
 	@build-release/bin/ftcs_bench
 	@build-release/bin/analysis_bench
+	@build-release/bin/sim_bench
 	@bench/instructions.sh build-release
 
 check: deps-test configure

@@ -56,6 +56,8 @@ class Judge {
         return row.rms_perceived_ns;
       case CheckFigure::kMedian:
         return row.median_rms_ns;
+      case CheckFigure::kTrueRms:
+        return row.rms_true_ns;
       case CheckFigure::kDeviation:
         return row.deviation_ns;
       case CheckFigure::kCycles:

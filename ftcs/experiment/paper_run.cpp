@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "ftcs/analysis/convergence.h"
 #include "ftcs/analysis/statistics.h"
@@ -17,14 +18,33 @@ double cycles_or_never(const std::optional<std::uint64_t>& cycles) {
   return cycles ? static_cast<double>(*cycles) : std::numeric_limits<double>::infinity();
 }
 
+/// A whole servo where a control law is expected: forward messages alone, the path delay known to
+/// be zero.
+class ForwardOnly {
+ public:
+  explicit ForwardOnly(const AdaptiveConfig& config)
+      : servo_(std::make_unique<AdaptiveServo>(config)) {}
+
+  ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept {
+    return servo_->update({Direction::kForward, sample.origin, sample.local, sample.free_running},
+                          now);
+  }
+
+ private:
+  std::unique_ptr<AdaptiveServo> servo_;  // kilobytes
+};
+
 /// Runs the row's servo; `observe` sees every sample.
 template <class Observer>
 void run_row(const PaperRow& row, std::uint64_t seed, Observer observe) {
   if (const auto* ftcs = std::get_if<FtcsConfig>(&row.servo)) {
     FtcsServo law(*ftcs);
     sim::run_one_way(row.world, seed, law, observe);
+  } else if (const auto* pics = std::get_if<PicsConfig>(&row.servo)) {
+    PicsServo law(*pics);
+    sim::run_one_way(row.world, seed, law, observe);
   } else {
-    PicsServo law(std::get<PicsConfig>(row.servo));
+    ForwardOnly law(std::get<AdaptiveConfig>(row.servo));
     sim::run_one_way(row.world, seed, law, observe);
   }
 }
@@ -67,6 +87,8 @@ double predicted_rms(const PaperRow& row) {
     // everywhere.
     return row.world.timestamp_noise_ns * std::sqrt(ftcs_noise_gain(ftcs->offset_gain).perceived);
   }
+  if (std::holds_alternative<AdaptiveConfig>(row.servo))
+    return kNotGiven;  // its gain falls with time
   const auto& pics = std::get<PicsConfig>(row.servo);
   // The loop sees the oscillator's skew as a gain error: its additive steps are steps of the
   // oscillator's time.

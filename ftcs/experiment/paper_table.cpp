@@ -57,6 +57,14 @@ PicsConfig read_pics(TomlTable& table, const sim::OneWaySpec& world) {
   return config;
 }
 
+AdaptiveConfig adaptive(const sim::OneWaySpec& world) {
+  AdaptiveConfig config;
+  config.sync_interval = whole(world.interval);
+  config.steering.rate = world.limits;
+  config.fixed_path_delay = Nanoseconds{0};
+  return config;
+}
+
 double number_or_nan(TomlTable& table, std::string_view key) {
   return table.number(key, kAny).value_or(kNotGiven);
 }
@@ -74,12 +82,14 @@ PaperRow read_row(TomlTable table, const sim::OneWaySpec& world) {
   row.paper_cycles = number_or_nan(table, "paper_cycles");
   row.model_rms_ns = number_or_nan(table, "model_rms_ns");
   row.note = table.text("note").value_or("");
-  const auto servo = table.word("servo", {"ftcs", "pics"});
-  if (!servo) table.fail_here("a row needs servo = \"ftcs\" or \"pics\"");
+  const auto servo = table.word("servo", {"ftcs", "pics", "adaptive"});
+  if (!servo) table.fail_here("a row needs servo = \"ftcs\", \"pics\" or \"adaptive\"");
   if (*servo == "ftcs") {
     row.servo = read_ftcs(table, row.world, FtcsConfig{});
-  } else {
+  } else if (*servo == "pics") {
     row.servo = read_pics(table, row.world);
+  } else {
+    row.servo = adaptive(row.world);
   }
   table.finish();
   return row;
@@ -89,6 +99,7 @@ const std::vector<std::pair<std::string, CheckFigure>>& figure_names() {
   static const std::vector<std::pair<std::string, CheckFigure>> kNames = {
       {"rms", CheckFigure::kRms},
       {"median", CheckFigure::kMedian},
+      {"true_rms", CheckFigure::kTrueRms},
       {"deviation", CheckFigure::kDeviation},
       {"cycles", CheckFigure::kCycles},
       {"seed_rms", CheckFigure::kSeedRms},

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "ftcs/servo/adaptive/adaptive_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/pics_servo.h"
 #include "ftcs/sim/one_way.h"
@@ -23,7 +24,7 @@ struct PaperRow {
   std::string group;     ///< what distinguishes it from a row of the same name, e.g. "T = 500 us"
   bool support = false;  ///< needed by a check, not a row of the paper's table
   sim::OneWaySpec world;
-  std::variant<FtcsConfig, PicsConfig> servo;
+  std::variant<FtcsConfig, PicsConfig, AdaptiveConfig> servo;
   double paper_rms_ns = kNotGiven;
   double paper_cycles = kNotGiven;
   double model_rms_ns = kNotGiven;  ///< of the independent model, docs/paper-reproduction.md
@@ -37,6 +38,7 @@ struct PaperRow {
 enum class CheckFigure : std::uint8_t {
   kRms,           ///< of each row: RMS of the perceived offset over all seeds
   kMedian,        ///< of each row: median over seeds of one run's RMS
+  kTrueRms,       ///< of each row: RMS of the true time error over all seeds
   kDeviation,     ///< of each row: deviation of the perceived offset about the run's own mean, over
                   ///< all seeds
   kCycles,        ///< of each row: median cycles to converge

@@ -1,0 +1,87 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# The laboratory as a user meets it: mistakes in files cost one line, shards merge to the whole, results survive.
+set -uo pipefail
+
+ftcs=$(realpath "${1:-build/ftcs}")
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+failures=0
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+expect() {  # exit code, text that the one line must hold, arguments...
+  local code=$1 text=$2 result
+  shift 2
+  timeout 60 "$ftcs" "$@" > out 2> err
+  result=$?
+  if [ "$result" -ne "$code" ] || [ "$(wc -l < err)" -ne 1 ] || ! grep -qF -- "$text" err; then
+    fail "ftcs $*: exit code $result, expected $code and one line with '$text'; got: $(cat err)"
+  fi
+}
+
+cat > good.toml <<'TOML'
+title = "good"
+servos = ["ftcs", "adaptive"]
+
+[run]
+sync_interval = "1 s"
+cycles = 40
+seeds = 5
+
+[path]
+delay = "10 us"
+jitter = { kind = "gaussian", sigma = "100 ns" }
+TOML
+
+sed 's/seeds = 5/seed = 5/' good.toml > unknown.toml
+sed 's/"10 us"/"10 ppm"/' good.toml > unit.toml
+sed 's/"10 us"/"-10 us"/' good.toml > negative.toml
+sed 's/\[run\]/[run/' good.toml > syntax.toml
+head -c 300 /dev/urandom > binary.toml
+: > empty.toml
+expect 2 'unknown.toml:7:1: unknown key seed in [run] (did you mean seeds?)' simulate unknown.toml
+expect 2 'unit.toml:10:9: delay = "10 ppm" is not a time' simulate unit.toml
+expect 2 'negative.toml:10:9: delay = -10000 is out of range' simulate negative.toml
+expect 2 'syntax.toml:' simulate syntax.toml
+expect 2 'binary.toml' simulate binary.toml
+expect 2 'a scenario needs a [run] table' simulate empty.toml
+expect 2 'none.toml: cannot be read' simulate none.toml
+expect 1 'no scenario files' compare --suite none
+expect 1 '--shard needs i/n' simulate good.toml --shard 3/2
+expect 1 'not a result of --shard' simulate good.toml --merge good.toml
+expect 1 'none.log' compare --log none.log
+expect 1 'empty.toml: no line of a known format' compare --log empty.toml
+expect 1 'binary.toml' compare --log binary.toml
+expect 1 'No space left on device' simulate good.toml -q --json /dev/full
+
+# Shards and their merge are the whole, to the byte.
+"$ftcs" simulate good.toml -q --json whole.json || fail "a good scenario"
+for i in 1 2 3; do
+  "$ftcs" simulate good.toml -q --shard $i/3 --json part$i.json || fail "shard $i"
+done
+"$ftcs" simulate good.toml -q --merge part1.json part2.json part3.json --json merged.json || fail "merge"
+cmp whole.json merged.json || fail "the merge of three shards differs from the whole"
+"$ftcs" simulate good.toml -q --threads 1 --json again.json
+cmp whole.json again.json || fail "one thread gives another result than several"
+
+# An interrupted sweep writes what it has.
+sed 's/seeds = 5/seeds = 100000/' good.toml > long.toml
+"$ftcs" simulate long.toml -q --json interrupted.json 2> err &
+program=$!
+sleep 1
+kill -INT $program
+wait $program
+[ $? -eq 1 ] || fail "an interrupted sweep must not succeed"
+grep -q '"complete": false' interrupted.json || fail "an interrupted sweep says that it is incomplete"
+grep -q '"seed": 1,' interrupted.json || fail "an interrupted sweep keeps its runs"
+
+"$ftcs" compare --seeds 2 > out || fail "ftcs compare without arguments"
+tail -n 4 out | grep -q '^bound' || fail "the bound is the last row"
+"$ftcs" paper -q --json paper.json > out || fail "ftcs paper"
+grep -q '"row": "FTCS1"' paper.json || fail "paper.json has its rows"
+
+exit $((failures > 0))
