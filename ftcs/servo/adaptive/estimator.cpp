@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Above 400 lines: the order of the steps is the algorithm, and each reads the same small state.
 #include "ftcs/servo/adaptive/estimator.h"
 
 #include <algorithm>
