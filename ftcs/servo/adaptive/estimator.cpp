@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Above 400 lines: the order of the steps is the algorithm, and each reads the same small state.
+// Length: the order of the steps is the algorithm, and each reads the same small state.
 #include "ftcs/servo/adaptive/estimator.h"
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <new>
 
 namespace ftcs::adaptive {
 namespace {
@@ -70,7 +70,8 @@ bool Estimator<Grid>::observable() const noexcept {
 template <class Grid>
 void Estimator<Grid>::restart() noexcept {
   const KnownDelay delay = known_delay_;
-  std::construct_at(this, delay);
+  ::new (static_cast<void*>(this))
+      Estimator(delay);  // in place: too large for the stack of a real-time thread
 }
 
 template <class Grid>
