@@ -149,6 +149,11 @@ TEST(AdaptiveServo, a_longer_path_hardly_disturbs_the_offset) {
   }
 }
 
+/// The sum modulo 2^64: the hostile stream's own counters wrap too.
+std::int64_t wrap(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+}
+
 /// A stream that no network would send, from a small generator; then forty good messages.
 TEST(AdaptiveServo, hostile_input_leaves_numbers_finite_and_is_forgotten) {
   std::mt19937_64 random(7);
@@ -173,8 +178,9 @@ TEST(AdaptiveServo, hostile_input_leaves_numbers_finite_and_is_forgotten) {
   for (int episode = 0; episode < 500; ++episode) {
     for (int i = 0; i < 100; ++i) {
       const auto jump = static_cast<std::int64_t>(random() >> (random() % 63));
-      reference = (episode % 3 == 0) ? static_cast<std::int64_t>(random()) : reference / 2 + jump;
-      oscillator = oscillator / 2 + static_cast<std::int64_t>(random() >> (random() % 63));
+      reference =
+          (episode % 3 == 0) ? static_cast<std::int64_t>(random()) : wrap(reference / 2, jump);
+      oscillator = wrap(oscillator / 2, static_cast<std::int64_t>(random() >> (random() % 63)));
       feed(random() % 2 == 0 ? Direction::kForward : Direction::kBackward,
            static_cast<std::int64_t>(random()));
     }
