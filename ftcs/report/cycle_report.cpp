@@ -19,8 +19,6 @@ using experiment::PaperCheckResult;
 
 constexpr const char* kTitle = "Table 6: EtherCAT main device on a timer of 10 us";
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 bool row_passed(const CycleResult& result, const CycleRow& row) {
   return std::all_of(
       result.checks.begin(), result.checks.end(),

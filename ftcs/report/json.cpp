@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/report/json.h"
 
+#include <cmath>
 #include <optional>
 
 namespace ftcs {
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
 namespace {
 
 Json or_null(std::optional<std::uint64_t> value) { return value ? Json(*value) : Json(nullptr); }

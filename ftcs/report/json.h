@@ -15,6 +15,9 @@ namespace ftcs {
 /// Fields in the order in which they were written. A number that is not finite is written as null.
 using Json = nlohmann::ordered_json;
 
+/// A number, or null where there is no figure.
+[[nodiscard]] Json number(double value);
+
 /// Field names are an interface: they are only added to, never renamed. `unit` ends the names of
 /// figures, as in rms_ns; values are divided by `scale` (1e-9 for nanoseconds from seconds).
 [[nodiscard]] Json to_json(const RunningStatistics& statistics, const std::string& unit,

@@ -10,8 +10,6 @@
 namespace ftcs {
 namespace {
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 std::string usage_text(const experiment::RecordedLog& log) {
   return fmt::format(
       "{}: {} lines, {} used, {} not usable; {} pairs, one forward message in {:.6g} s", log.format,

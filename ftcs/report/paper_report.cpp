@@ -16,8 +16,6 @@ using experiment::PaperResult;
 using experiment::PaperRow;
 using experiment::PaperRowResult;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 /// The interval on one side only is "at least" or "at most".
 std::string demand_text(const PaperCheckResult& check) {
   if (std::isnan(check.least) && std::isnan(check.most)) {

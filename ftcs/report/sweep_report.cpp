@@ -51,8 +51,6 @@ Cell cycles_cell(double cycles) {
   return std::isinf(cycles) ? Cell("never") : Cell::fixed(cycles, 2);
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json runs_json(const ServoResult& servo) {
   Json runs = Json::array();
   for (std::size_t i = 0; i < servo.runs.size(); ++i) {
