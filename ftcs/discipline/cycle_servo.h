@@ -55,6 +55,7 @@ class BasicCycleServo {
   void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
   void restart_law() noexcept;
   [[nodiscard]] bool rate_known() const noexcept;
+  [[nodiscard]] FreeRunningTime scheduled_of(const CycleSample& sample) const noexcept;
   [[nodiscard]] FreeRunningTime stamp_of(const CycleSample& sample) const noexcept;
   [[nodiscard]] CycleDecision decide(FreeRunningTime now) noexcept;
 

@@ -90,8 +90,14 @@ bool BasicCycleServo<Adaptive>::rate_known() const noexcept {
 }
 
 template <class Adaptive>
+FreeRunningTime BasicCycleServo<Adaptive>::scheduled_of(const CycleSample& sample) const noexcept {
+  return sample.has_scheduled ? sample.scheduled : trigger_.scheduled;
+}
+
+template <class Adaptive>
 FreeRunningTime BasicCycleServo<Adaptive>::stamp_of(const CycleSample& sample) const noexcept {
-  return config_.trigger == TriggerModel::kKnown ? sample.sent : trigger_.virtual_instant;
+  if (config_.trigger == TriggerModel::kKnown) return sample.sent;
+  return sample.has_scheduled ? sample.scheduled : trigger_.virtual_instant;
 }
 
 template <class Adaptive>
@@ -99,7 +105,8 @@ CycleVerdict BasicCycleServo<Adaptive>::judge(const CycleSample& sample) const n
   if (!sample.has_reference) return CycleVerdict::kLost;
   const Duration late{config_.largest_lateness};
   const Duration slow{config_.largest_round_trip};
-  if (late > Duration{} && abs(sample.sent - trigger_.scheduled) > late) return CycleVerdict::kLate;
+  if (late > Duration{} && abs(sample.sent - scheduled_of(sample)) > late)
+    return CycleVerdict::kLate;
   if (slow > Duration{} && sample.has_received && sample.received - sample.sent > slow) {
     return CycleVerdict::kSlow;
   }
@@ -132,7 +139,7 @@ CycleDecision BasicCycleServo<Adaptive>::update(const CycleSample& sample,
                                                 FreeRunningTime now) noexcept {
   ++counters_.cycles;
   decision_.commanded = false;
-  decision_.lateness = sample.sent - trigger_.scheduled;
+  decision_.lateness = sample.sent - scheduled_of(sample);
   decision_.verdict = judge(sample);
   if (decision_.verdict == CycleVerdict::kUsed) {
     coasting_ = 0;

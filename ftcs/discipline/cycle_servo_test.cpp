@@ -3,8 +3,9 @@
 // a stamp, 300 ns good), and a reference that a frame reaches 700 ns after it was sent. Cycle 1 ms.
 #include "ftcs/discipline/cycle_servo.h"
 
+#include <array>
 #include <cmath>
-#include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -65,7 +66,17 @@ struct World {
       sample.reference = ReferenceTime{local + local - sample.reference.since_epoch()};
     }
     if (change) change(sample);
-    decision = servo.update(sample, really_sent + round_trip);
+    if (a_cycle_behind) {
+      // Woken by this cycle's timer, the loop takes the frame of the cycle before.
+      const FreeRunningTime woken = really_sent - Duration{kTransit};
+      sample.scheduled = decision.wake;
+      sample.has_scheduled = true;
+      sample.has_received = false;
+      std::swap(sample, in_flight);
+      decision = servo.update(sample, woken);
+    } else {
+      decision = servo.update(sample, really_sent + round_trip);
+    }
     stall = {};
   }
   void run(int n) {
@@ -92,6 +103,8 @@ struct World {
   bool falsify_lateness = false;
   bool mirror_reference = false;
   void (*change)(CycleSample&) = nullptr;
+  bool a_cycle_behind = false;
+  CycleSample in_flight;
   std::uint64_t state = 42;
 };
 
@@ -256,6 +269,78 @@ TEST_P(EachLaw, a_coarse_timer_is_no_noise_when_its_rounding_is_known) {
   }
   EXPECT_LT(std::sqrt(virtual_error / 2000), 500.0);
   EXPECT_NEAR(std::sqrt(event / 2000), 10'000.0 / std::sqrt(12.0), 200.0);
+}
+
+TEST_P(EachLaw, a_frame_that_comes_back_in_the_next_cycle_serves_as_well) {
+  World world(config_of(GetParam()));
+  world.a_cycle_behind = true;
+  world.run(700);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_LT(world.rms(2000), 500.0);
+  EXPECT_EQ(world.servo.counters().skipped, 0U);
+  for (int i = 0; i < 2000; ++i) {
+    if (i % 500 == 250) world.stall = Nanoseconds{5'000'000};
+    world.cycle(i % 20 == 3);
+    ASSERT_LT(std::abs(world.true_error()), 3000.0) << "cycle " << i;
+  }
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  EXPECT_EQ(world.servo.counters().late, 4U);
+}
+
+TEST(CycleServo, the_lock_has_hysteresis) {
+  CycleServoConfig config = config_of(CycleLaw::kNone);
+  World world(config);
+  world.ppm = 0.0;
+  world.stamp_noise = 0.0;
+  world.run(19);
+  EXPECT_EQ(world.decision.state, CycleState::kAcquiring) << "twenty cycles in a row are asked for";
+  world.run(1);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  world.jump = Nanoseconds{15'000};  // between enter (5 us) and leave (20 us)
+  world.run(100);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+  world.jump = Nanoseconds{21'000};
+  world.run(1);
+  EXPECT_EQ(world.decision.state, CycleState::kAcquiring);
+  world.jump = Nanoseconds{15'000};
+  world.run(100);
+  EXPECT_EQ(world.decision.state, CycleState::kAcquiring);
+  world.jump = Nanoseconds{0};
+  world.run(20);
+  EXPECT_EQ(world.decision.state, CycleState::kLocked);
+}
+
+/// What PICS sees at its first sync points when it starts 100 us away, ns.
+std::array<double, 8> errors_of_pics(std::uint32_t cycles_per_sync) {
+  CycleServoConfig config = config_of(CycleLaw::kPics);
+  config.cycles_per_sync = cycles_per_sync;
+  config.proportional_gain = 0.5;
+  config.integral_gain = 0.3;
+  config.align_at_start = false;
+  config.largest_lateness = {};
+  World world(config);
+  world.ppm = 0.0;
+  world.stamp_noise = 0.0;
+  // The first trigger stands 100 us before the grid of the reference.
+  const std::int64_t at =
+      world.reference_at(world.decision.virtual_instant).since_epoch().rounded_ns();
+  world.start -= (at + 100'000) % kCycle.count();
+  std::array<double, 8> errors{};
+  for (std::size_t n = 0; n < errors.size();) {
+    world.cycle();
+    if (world.decision.commanded) errors[n++] = world.decision.phase_error.ns();
+  }
+  return errors;
+}
+
+TEST(CycleServo, gains_of_pics_do_not_depend_on_the_cycles_per_interval) {
+  const auto coarse = errors_of_pics(50);
+  const auto fine = errors_of_pics(500);
+  EXPECT_NEAR(coarse[0], 100'000.0, 1'000.0);
+  EXPECT_LT(std::abs(coarse[7]), 20'000.0);
+  for (std::size_t n = 0; n < coarse.size(); ++n) {
+    EXPECT_NEAR(coarse[n], fine[n], 0.03 * 100'000.0) << "sync interval " << n;
+  }
 }
 
 TEST(CycleServo, the_adaptive_law_locks_within_fifty_cycles) {

@@ -59,6 +59,10 @@ struct CycleSample {
   FreeRunningTime sent;
   bool has_received = false;
   FreeRunningTime received;
+  /// The wake-up of the cycle that sent the frame, where that is not the latest one: loops that
+  /// take a frame back when the next cycle begins.
+  bool has_scheduled = false;
+  FreeRunningTime scheduled;
 };
 
 enum class CycleState : std::uint8_t {

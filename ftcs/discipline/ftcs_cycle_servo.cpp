@@ -40,10 +40,17 @@ ftcs_cycle_decision to_c(const ftcs::CycleDecision& decision) noexcept {
 
 bool is_gain(double gain) noexcept { return gain >= 0.0 && gain < 1e9; }
 
+constexpr int64_t kHour = 3'600'000'000'000;
+bool within_hour(int64_t ns) noexcept { return ns >= -kHour && ns <= kHour; }
+
 int32_t check(const ftcs_cycle_config& config) noexcept {
   const int32_t last = kHasAdaptive ? FTCS_CYCLE_ADAPTIVE : FTCS_CYCLE_PICS;
   if (config.law < FTCS_CYCLE_NONE || config.law > last) return FTCS_CYCLE_BAD_LAW;
   if (config.cycle_ns <= 0 || config.resolution_ns <= 0 || config.cycles_per_sync == 0) {
+    return FTCS_CYCLE_BAD_CYCLE;
+  }
+  if (!within_hour(config.cycle_ns) || !within_hour(config.resolution_ns) ||
+      config.cycles_per_sync > kHour / config.cycle_ns) {
     return FTCS_CYCLE_BAD_CYCLE;
   }
   if (!is_gain(config.proportional_gain) || !is_gain(config.integral_gain) ||
@@ -54,7 +61,8 @@ int32_t check(const ftcs_cycle_config& config) noexcept {
   if (!(config.limit_ppm > 0.0 && config.limit_ppm < kMostPpm)) return FTCS_CYCLE_BAD_LIMIT;
   const bool bounds = config.band_ns >= 0 && config.largest_lateness_ns >= 0 &&
                       config.largest_round_trip_ns >= 0 && config.lock_enter_ns >= 0 &&
-                      config.lock_leave_ns >= config.lock_enter_ns;
+                      config.lock_leave_ns >= config.lock_enter_ns &&
+                      within_hour(config.shift_ns) && within_hour(config.transit_ns);
   return bounds ? FTCS_CYCLE_OK : FTCS_CYCLE_BAD_LIMIT;
 }
 
@@ -130,6 +138,8 @@ ftcs_cycle_decision ftcs_cycle_update(ftcs_cycle_servo* servo, const ftcs_cycle_
   input.sent = ftcs::FreeRunningTime::from_ns(sample->sent_ns);
   input.has_received = sample->has_received != 0;
   input.received = ftcs::FreeRunningTime::from_ns(sample->received_ns);
+  input.has_scheduled = sample->has_scheduled != 0;
+  input.scheduled = ftcs::FreeRunningTime::from_ns(sample->scheduled_ns);
   return to_c(servo_in(*servo).update(input, ftcs::FreeRunningTime::from_ns(now_ns)));
 }
 

@@ -6,9 +6,11 @@
  * that only the task's own frames can read). For main devices in C: no heap, no system call, no C++
  * run-time library. One servo belongs to one thread.
  *
- *   wake up at decision.wake_ns -> note the time -> send the frame (FRMW or FPRD of 0x0910, 8
- * bytes)
+ *   wake up at decision.wake_ns -> note the time -> send the frame (FRMW or FPRD of 0x0910)
  *   -> take it back -> ftcs_cycle_update() -> wake up at decision.wake_ns ...
+ *
+ * Loops that take a frame back only when the next cycle begins (SOEM's, IgH's and LinuxCNC's do)
+ * say which wake-up the frame belonged to: has_scheduled and scheduled_ns.
  *
  * All host times are nanoseconds of one clock that nobody steers (CLOCK_MONOTONIC or
  * CLOCK_MONOTONIC_RAW; the one that the wake-up uses). Reference times are the system time of the
@@ -50,9 +52,11 @@ enum ftcs_cycle_error {
   FTCS_CYCLE_OK = 0,
   FTCS_CYCLE_BAD_STORAGE = 1, /* header and library were built differently */
   FTCS_CYCLE_BAD_LAW = 2,     /* unknown, or the adaptive one is not in this library */
-  FTCS_CYCLE_BAD_CYCLE = 3,   /* cycle_ns, resolution_ns or cycles_per_sync not above zero */
+  FTCS_CYCLE_BAD_CYCLE = 3,   /* cycle_ns, resolution_ns or cycles_per_sync not above zero, or the
+                                 cycle or the sync interval longer than an hour */
   FTCS_CYCLE_BAD_GAIN = 4,    /* not finite, negative, or offset_gain above 1 */
-  FTCS_CYCLE_BAD_LIMIT = 5    /* limit_ppm not within (0, 500000), a negative bound */
+  FTCS_CYCLE_BAD_LIMIT = 5    /* limit_ppm not within (0, 500000), a negative bound, lock_leave_ns
+                                 below lock_enter_ns, shift or transit beyond an hour */
 };
 
 typedef struct ftcs_cycle_config {
@@ -79,10 +83,13 @@ typedef struct ftcs_cycle_config {
 
 typedef struct ftcs_cycle_sample {
   int32_t has_reference; /* zero: the frame was lost */
-  int32_t has_received;
+  int32_t has_received;  /* zero: received_ns is unknown, no frame is called slow */
+  int32_t has_scheduled; /* zero: the frame belongs to the wake-up that was last asked for */
+  int32_t reserved;
   int64_t reference_ns; /* latch of the system time, 64 bits, no wrap */
   int64_t sent_ns;      /* as close to the wire as there is a stamp */
   int64_t received_ns;
+  int64_t scheduled_ns; /* decision.wake_ns of the cycle that sent the frame */
 } ftcs_cycle_sample;
 
 typedef struct ftcs_cycle_decision {
