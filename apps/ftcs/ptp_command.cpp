@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
-#include "apps/ftcs/number_check.h"
+#include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_port.h"
 #include "apps/ftcs/units.h"
@@ -20,47 +18,12 @@ namespace {
 
 using Wrong = std::optional<std::string>;
 
-/// The command line as it was given: a configuration file is read first, the command line wins.
-struct PtpArguments {
-  std::vector<std::string> interfaces;
-  std::string config_file;
-  std::vector<std::pair<std::string, std::string>> settings;  ///< ptp4l's names
-  bool receiver_only = false;
-  bool hardware = false;
-  bool software = false;
-  std::string role;
-  std::string servo;
-  std::optional<double> offset_gain;
-  std::string converged_band;
-  std::optional<std::uint32_t> converged_dwell;
-  std::string correction_time;
-  std::string max_frequency;
-  std::string clock = "virtual";
-  std::string offset;
-  std::string skew;
-  bool first_step = false;
-  bool json = false;
-  bool csv = false;
-  std::optional<std::uint16_t> event_port;
-  std::optional<std::uint16_t> general_port;
-  std::string unicast;
-  std::optional<double> duration_s;
-};
-
 Wrong set_duration(const std::string& text, const char* flag, Duration& target) {
   if (text.empty()) return std::nullopt;
   const auto value = parse_duration(text);
   if (!value) return fmt::format("{}: {}", flag, value.error().message);
   target = *value;
   return std::nullopt;
-}
-
-std::string servo_names() {
-  std::string names;
-  for (const ServoKindName& known : kServoKinds) {
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
-  }
-  return names;
 }
 
 Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
@@ -165,125 +128,13 @@ Wrong make_options(const PtpArguments& arguments, PtpOptions& options) {
   return std::nullopt;
 }
 
-void refuse(CLI::App& command, const char* flag, const char* reason) {
-  command.add_flag_callback(
-      flag, [flag, reason] { throw CLI::ValidationError(flag, reason); }, reason);
-}
-
-void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
-  command.set_help_flag("-h,--help", "print this help and exit");
-  command.set_version_flag("-v,--version", "ftcs " FTCS_VERSION, "print the version and exit");
-  command.add_option("-i", arguments.interfaces, "network interface, for example eth0")
-      ->type_name("NAME");
-  command.add_option("-f", arguments.config_file, "configuration file in ptp4l's format")
-      ->type_name("FILE");
-  command.add_flag("-s", arguments.receiver_only, "time receiver only (the default role)");
-  command
-      .add_option_function<std::string>(
-          "-l",
-          [&arguments](const std::string& level) {
-            arguments.settings.emplace_back("logging_level", level);
-          },
-          "log level, 0 to 7; default 6")
-      ->type_name("LEVEL");
-  command.add_flag_callback(
-      "-m", [] {}, "accepted: messages always go to standard output");
-  command.add_flag_callback(
-      "-q", [] {}, "accepted: messages never go to the system log");
-  command.add_flag_callback(
-      "-E", [] {}, "end-to-end delay (the only one)");
-  command.add_flag_callback(
-      "-A", [] {}, "accepted as -E");
-  command.add_flag_callback(
-      "-4", [] {}, "UDP over IPv4 (the only transport)");
-  auto* hardware = command.add_flag("-H", arguments.hardware, "hardware time stamping or an error");
-  auto* software = command.add_flag("-S", arguments.software, "software time stamping or an error");
-  hardware->excludes(software);
-  refuse(command, "-P", "the peer delay mechanism is not supported");
-  refuse(command, "-2", "transport over IEEE 802.3 is not supported");
-  refuse(command, "-6", "transport over UDP/IPv6 is not supported");
-  refuse(command, "-L", "legacy time stamping is not supported");
-  command
-      .add_option_function<std::string>(
-          "-p",
-          [](const std::string&) {
-            throw CLI::ValidationError("-p", "steering a hardware clock is not supported");
-          },
-          "not supported: the steered clock is virtual")
-      ->type_name("DEVICE");
-}
-
-void add_own_flags(CLI::App& command, PtpArguments& arguments) {
-  command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
-      ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
-  command.add_option("--servo", arguments.servo, servo_names() + "; default ftcs")
-      ->type_name("NAME");
-  command
-      .add_option("--offset-gain", arguments.offset_gain,
-                  "ftcs: p inside the band, 0 to 1; default 1/16")
-      ->type_name("P");
-  command
-      .add_option("--converged-band", arguments.converged_band,
-                  "ftcs: B, as ENTER[:LEAVE], for example 1us:5us")
-      ->type_name("BAND");
-  command
-      .add_option("--converged-dwell", arguments.converged_dwell,
-                  "ftcs: samples inside the band before p applies; default 4")
-      ->type_name("N")
-      ->check(integer_from(0, 1'000'000'000));
-  command
-      .add_option("--correction-time", arguments.correction_time,
-                  "ftcs: T_c, in which an offset is removed; default: the Sync interval")
-      ->type_name("TIME");
-  command
-      .add_option("--max-frequency", arguments.max_frequency,
-                  "largest adjustment, for example 500ppm")
-      ->type_name("RATE");
-  command.add_option("--clock", arguments.clock, "virtual (the only one)")->type_name("NAME");
-  command
-      .add_option("--offset", arguments.offset,
-                  "the virtual clock starts at CLOCK_REALTIME plus this, for example 1ms")
-      ->type_name("TIME");
-  command
-      .add_option("--skew", arguments.skew,
-                  "rate error of the virtual clock's oscillator, for example 50ppm")
-      ->type_name("RATE");
-  command.add_flag("--first-step", arguments.first_step, "allow one step at the start");
-  auto* json = command.add_flag("--json", arguments.json, "one JSON object a sample");
-  command.add_flag("--csv", arguments.csv, "one CSV line a sample")->excludes(json);
-  command.add_option("--event-port", arguments.event_port, "UDP port; default 319")
-      ->type_name("PORT")
-      ->check(integer_from(1, 65'535));
-  command.add_option("--general-port", arguments.general_port, "UDP port; default 320")
-      ->type_name("PORT")
-      ->check(integer_from(1, 65'535));
-  command.add_option("--unicast", arguments.unicast, "IPv4 address of the only peer")
-      ->type_name("ADDRESS");
-  command.add_option("--duration", arguments.duration_s, "stop after so many seconds")
-      ->type_name("SECONDS")
-      ->check(number_from(0.001, 1e9));
-}
-
 }  // namespace
 
 void add_ptp_command(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("ptp", "follow a PTP time transmitter, or be one (flags as ptp4l's)");
   const auto arguments = std::make_shared<PtpArguments>();
-  add_ptp4l_flags(*command, *arguments);
-  add_own_flags(*command, *arguments);
-  for (const PtpSetting& setting : ptp_settings()) {
-    const std::string name = setting.name;
-    command
-        ->add_option_function<std::string>(
-            "--" + name,
-            [arguments, name](const std::string& value) {
-              arguments->settings.emplace_back(name, value);
-            },
-            setting.help)
-        ->type_name("VALUE")
-        ->group("Settings of ptp4l's configuration file");
-  }
+  add_ptp_arguments(*command, *arguments);
   command->callback([arguments, &exit_code] {
     PtpOptions options;
     if (const auto wrong = make_options(*arguments, options)) {

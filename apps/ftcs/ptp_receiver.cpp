@@ -63,38 +63,15 @@ DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stam
 PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                          std::unique_ptr<platform::TimestampClock> timestamps,
                          const ptp::PortIdentity& identity)
-    : PtpPort(kernel, options, log, std::move(timestamps)),
-      core_(core_config(options, identity,
-                        static_cast<std::uint64_t>(now().since_epoch().floor_ns()))),
+    : PtpCorePort(kernel, options, log, std::move(timestamps),
+                  core_config(options, identity,
+                              static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW)))),
       discipline_(discipline_config(options, has_hardware_stamps()), clock()) {}
 
 ptp::ActionList PtpReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
-  return core_.start(now);
+  return PtpCorePort::start(now);
 }
-
-ptp::ActionList PtpReceiver::on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
-                                      FreeRunningTime now) {
-  return core_.on_event_message(bytes, received, now);
-}
-
-ptp::ActionList PtpReceiver::on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) {
-  return core_.on_general_message(bytes, now);
-}
-
-ptp::ActionList PtpReceiver::on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
-                                     FreeRunningTime now) {
-  return sent ? core_.on_transmit_timestamp(sequence_id, *sent, now)
-              : core_.on_transmit_timestamp_missing(sequence_id, now);
-}
-
-ptp::ActionList PtpReceiver::on_timer(FreeRunningTime now) { return core_.on_timer(now); }
-
-ptp::ActionList PtpReceiver::on_link_change(bool up, FreeRunningTime now) {
-  return up ? core_.on_link_up(now) : core_.on_link_down(now);
-}
-
-std::optional<FreeRunningTime> PtpReceiver::deadline() const { return core_.deadline(); }
 
 void PtpReceiver::act(const ptp::Action& action) {
   if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) {
@@ -179,7 +156,7 @@ void PtpReceiver::report_text(const SampleRecord& record) {
 
 // As ptp4l: 2^(summary_interval - logSyncInterval) samples.
 std::uint64_t PtpReceiver::samples_per_summary() const {
-  const auto interval = core_.sync_interval();
+  const auto interval = core().sync_interval();
   if (!interval || *interval <= Duration{}) return 1;
   const double samples = std::exp2(options().summary_interval) / interval->seconds();
   return samples < 2.0 ? 1 : static_cast<std::uint64_t>(samples);
@@ -188,10 +165,10 @@ std::uint64_t PtpReceiver::samples_per_summary() const {
 // From the port's state and not from a change of the lock: after a fault shorter than the lock's
 // patience the port comes back uncalibrated while the clock has been locked all along.
 void PtpReceiver::follow_lock(bool locked) {
-  if (locked && core_.state() == ptp::PortState::kUncalibrated) {
-    perform(core_.on_servo_locked(now()));
-  } else if (!locked && core_.state() == ptp::PortState::kTimeReceiver) {
-    perform(core_.on_servo_unlocked(now()));
+  if (locked && core().state() == ptp::PortState::kUncalibrated) {
+    perform(core().on_servo_locked(now()));
+  } else if (!locked && core().state() == ptp::PortState::kTimeReceiver) {
+    perform(core().on_servo_unlocked(now()));
   }
 }
 
@@ -214,7 +191,7 @@ int PtpReceiver::finish() {
   if (since_lock_.count() > 0) {
     log()(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
   }
-  log_unusual(core_.counters());
+  log_unusual(core().counters());
   return locked ? kSuccess : kNotLocked;
 }
 

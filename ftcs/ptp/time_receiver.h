@@ -45,6 +45,7 @@ inline constexpr Nanoseconds kJumpTolerance{500'000'000};
 class TimeReceiver {
  public:
   using Config = TimeReceiverConfig;
+  using Stamp = FreeRunningTime;  ///< of event messages
   explicit TimeReceiver(const Config& config) noexcept;
 
   /// INITIALIZING to LISTENING. Before, everything is ignored.

@@ -38,6 +38,7 @@ struct TimeTransmitterConfig {
 class TimeTransmitter {
  public:
   using Config = TimeTransmitterConfig;
+  using Stamp = ReferenceTime;  ///< of event messages
   explicit TimeTransmitter(const Config& config) noexcept;
 
   /// INITIALIZING to LISTENING to MASTER; first Announce and Sync are due at once.

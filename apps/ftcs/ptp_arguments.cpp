@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/ptp_arguments.h"
+
+#include <fmt/core.h>
+
+#include "apps/ftcs/number_check.h"
+#include "apps/ftcs/ptp_option_table.h"
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs::app {
+namespace {
+
+/// One line an option.
+class Flags {
+ public:
+  explicit Flags(CLI::App& command) : command_(command) {}
+
+  template <class Target>
+  CLI::Option* value(const char* flag, Target& target, const char* type, const std::string& help) {
+    return command_.add_option(flag, target, help)->type_name(type);
+  }
+  CLI::Option* given(const char* flag, bool& target, const char* help) {
+    return command_.add_flag(flag, target, help);
+  }
+  /// As --NAME VALUE for a setting of ptp4l's configuration file; later ones win.
+  void setting(const char* flag, const char* name, PtpArguments& arguments, const char* type,
+               const char* help) {
+    command_
+        .add_option_function<std::string>(
+            flag,
+            [&arguments, name](const std::string& value) {
+              arguments.settings.emplace_back(name, value);
+            },
+            help)
+        ->type_name(type);
+  }
+  /// A flag that stands for one value of a setting.
+  void shorthand(const char* flag, const char* name, const char* value, PtpArguments& arguments,
+                 const char* help) {
+    command_.add_flag_callback(
+        flag, [&arguments, name, value] { arguments.settings.emplace_back(name, value); }, help);
+  }
+  void accept(const char* flag, const char* help) {
+    command_.add_flag_callback(
+        flag, [] {}, help);
+  }
+  void refuse(const char* flag, const char* reason) {
+    command_.add_flag_callback(
+        flag, [flag, reason] { throw CLI::ValidationError(flag, reason); }, reason);
+  }
+
+ private:
+  CLI::App& command_;
+};
+
+void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
+  command.set_help_flag("-h,--help", "print this help and exit");
+  command.set_version_flag("-v,--version", "ftcs " FTCS_VERSION, "print the version and exit");
+  Flags flags(command);
+  flags.value("-i", arguments.interfaces, "NAME", "network interface, for example eth0");
+  flags.value("-f", arguments.config_file, "FILE", "configuration file in ptp4l's format");
+  flags.given("-s", arguments.receiver_only, "time receiver only (the default role)");
+  flags.setting("-l", "logging_level", arguments, "LEVEL", "log level, 0 to 7; default 6");
+  flags.accept("-m", "accepted: messages always go to standard output");
+  flags.accept("-q", "accepted: messages never go to the system log");
+  flags.shorthand("-E", "delay_mechanism", "E2E", arguments, "end-to-end delay (the only one)");
+  flags.shorthand("-A", "delay_mechanism", "E2E", arguments, "accepted as -E");
+  flags.shorthand("-4", "network_transport", "UDPv4", arguments,
+                  "UDP over IPv4 (the only transport)");
+  auto* hardware = flags.given("-H", arguments.hardware, "hardware time stamping or an error");
+  auto* software = flags.given("-S", arguments.software, "software time stamping or an error");
+  hardware->excludes(software);
+  flags.refuse("-P", "the peer delay mechanism is not supported");
+  flags.refuse("-2", "transport over IEEE 802.3 is not supported");
+  flags.refuse("-6", "transport over UDP/IPv6 is not supported");
+  flags.refuse("-L", "legacy time stamping is not supported");
+  command
+      .add_option_function<std::string>(
+          "-p",
+          [](const std::string&) {
+            throw CLI::ValidationError("-p", "steering a hardware clock is not supported");
+          },
+          "not supported: the steered clock is virtual")
+      ->type_name("DEVICE");
+}
+
+void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
+  Flags flags(command);
+  flags.value("--servo", arguments.servo, "NAME", servo_names() + "; default ftcs");
+  flags.value("--offset-gain", arguments.offset_gain, "P",
+              "ftcs: p inside the band, 0 to 1; default 1/16");
+  flags.value("--converged-band", arguments.converged_band, "BAND",
+              "ftcs: B, as ENTER[:LEAVE], for example 1us:5us");
+  flags
+      .value("--converged-dwell", arguments.converged_dwell, "N",
+             "ftcs: samples inside the band before p applies; default 4")
+      ->check(integer_from(0, 1'000'000'000));
+  flags.value("--correction-time", arguments.correction_time, "TIME",
+              "ftcs: T_c, in which an offset is removed; default: the Sync interval");
+  flags.value("--max-frequency", arguments.max_frequency, "RATE",
+              "largest adjustment, for example 500ppm");
+}
+
+void add_clock_flags(CLI::App& command, PtpArguments& arguments) {
+  Flags flags(command);
+  flags.value("--clock", arguments.clock, "NAME", "virtual (the only one)");
+  flags.value("--offset", arguments.offset, "TIME",
+              "the virtual clock starts at CLOCK_REALTIME plus this, for example 1ms");
+  flags.value("--skew", arguments.skew, "RATE",
+              "rate error of the virtual clock's oscillator, for example 50ppm");
+  flags.given("--first-step", arguments.first_step, "allow one step at the start");
+}
+
+void add_run_flags(CLI::App& command, PtpArguments& arguments) {
+  command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
+      ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
+  Flags flags(command);
+  auto* json = flags.given("--json", arguments.json, "one JSON object a sample");
+  flags.given("--csv", arguments.csv, "one CSV line a sample")->excludes(json);
+  flags.value("--duration", arguments.duration_s, "SECONDS", "stop after so many seconds")
+      ->check(number_from(0.001, 1e9));
+}
+
+void add_network_flags(CLI::App& command, PtpArguments& arguments) {
+  Flags flags(command);
+  flags.value("--event-port", arguments.event_port, "PORT", "UDP port; default 319")
+      ->check(integer_from(1, 65'535));
+  flags.value("--general-port", arguments.general_port, "PORT", "UDP port; default 320")
+      ->check(integer_from(1, 65'535));
+  flags.value("--unicast", arguments.unicast, "ADDRESS", "IPv4 address of the only peer");
+}
+
+}  // namespace
+
+void add_ptp_arguments(CLI::App& command, PtpArguments& arguments) {
+  add_ptp4l_flags(command, arguments);
+  add_servo_flags(command, arguments);
+  add_clock_flags(command, arguments);
+  add_run_flags(command, arguments);
+  add_network_flags(command, arguments);
+  for (const PtpSetting& setting : ptp_settings()) {
+    const std::string name = setting.name;
+    command
+        .add_option_function<std::string>(
+            "--" + name,
+            [&arguments, name](const std::string& value) {
+              arguments.settings.emplace_back(name, value);
+            },
+            setting.help)
+        ->type_name("VALUE")
+        ->group("Settings of ptp4l's configuration file");
+  }
+}
+
+std::string servo_names() {
+  std::string names;
+  for (const ServoKindName& known : kServoKinds) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
+  }
+  return names;
+}
+
+}  // namespace ftcs::app

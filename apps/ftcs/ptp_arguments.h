@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace ftcs::app {
+
+/// The command line as it was given: a configuration file is read first, the command line wins.
+struct PtpArguments {
+  std::vector<std::string> interfaces;
+  std::string config_file;
+  std::vector<std::pair<std::string, std::string>> settings;  ///< ptp4l's names
+  bool receiver_only = false;
+  bool hardware = false;
+  bool software = false;
+  std::string role;
+  std::string servo;
+  std::optional<double> offset_gain;
+  std::string converged_band;
+  std::optional<std::uint32_t> converged_dwell;
+  std::string correction_time;
+  std::string max_frequency;
+  std::string clock = "virtual";
+  std::string offset;
+  std::string skew;
+  bool first_step = false;
+  bool json = false;
+  bool csv = false;
+  std::optional<std::uint16_t> event_port;
+  std::optional<std::uint16_t> general_port;
+  std::string unicast;
+  std::optional<double> duration_s;
+};
+
+/// The flags of `ftcs ptp`: ptp4l's, our own, and every setting of ptp4l's configuration file.
+/// `arguments` must outlive `command`.
+void add_ptp_arguments(CLI::App& command, PtpArguments& arguments);
+
+/// "adaptive, ftcs, pics ..."
+[[nodiscard]] std::string servo_names();
+
+}  // namespace ftcs::app

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <type_traits>
+#include <utility>
+
+#include "apps/ftcs/ptp_port.h"
+
+namespace ftcs::app {
+
+/// A PtpPort around one protocol core (ptp::TimeReceiver, ptp::TimeTransmitter): hands every input
+/// to it. A core's Stamp says on which clock it takes event stamps: its free-running clock, or the
+/// reference, which at a transmitter is the port's own clock.
+template <class Core>
+class PtpCorePort : public PtpPort {
+ protected:
+  PtpCorePort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+              std::unique_ptr<platform::TimestampClock> timestamps,
+              const typename Core::Config& config)
+      : PtpPort(kernel, options, log, std::move(timestamps)), core_(config) {}
+
+  [[nodiscard]] Core& core() { return core_; }
+  [[nodiscard]] const Core& core() const { return core_; }
+
+  ptp::ActionList start(FreeRunningTime now) override { return core_.start(now); }
+
+ private:
+  using Stamp = typename Core::Stamp;
+
+  ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                           FreeRunningTime now) final {
+    return core_.on_event_message(bytes, stamp_of(received), now);
+  }
+  ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) final {
+    return core_.on_general_message(bytes, now);
+  }
+  ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
+                          FreeRunningTime now) final {
+    return sent ? core_.on_transmit_timestamp(sequence_id, stamp_of(*sent), now)
+                : core_.on_transmit_timestamp_missing(sequence_id, now);
+  }
+  ptp::ActionList on_timer(FreeRunningTime now) final { return core_.on_timer(now); }
+  ptp::ActionList on_link_change(bool up, FreeRunningTime now) final {
+    return up ? core_.on_link_up(now) : core_.on_link_down(now);
+  }
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const final { return core_.deadline(); }
+
+  [[nodiscard]] Stamp stamp_of(FreeRunningTime instant) {
+    if constexpr (std::is_same_v<Stamp, ReferenceTime>) {
+      return ReferenceTime{clock().local_at(instant).since_epoch()};
+    } else {
+      return instant;
+    }
+  }
+
+  Core core_;
+};
+
+}  // namespace ftcs::app
