@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/report/cycle_report.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <fmt/format.h>
 
+#include "ftcs/report/check_report.h"
 #include "ftcs/report/html_report.h"
 #include "ftcs/report/number_format.h"
 
@@ -15,15 +13,8 @@ namespace {
 using experiment::CycleResult;
 using experiment::CycleRow;
 using experiment::CycleSeedRun;
-using experiment::PaperCheckResult;
 
 constexpr const char* kTitle = "Table 6: EtherCAT main device on a timer of 10 us";
-
-bool row_passed(const CycleResult& result, const CycleRow& row) {
-  return std::all_of(
-      result.checks.begin(), result.checks.end(),
-      [&row](const PaperCheckResult& check) { return check.subject != row.name || check.passed; });
-}
 
 Json row_json(const CycleResult& result, std::size_t i) {
   const CycleRow& row = result.rows[i];
@@ -41,7 +32,7 @@ Json row_json(const CycleResult& result, std::size_t i) {
               {"predicted_rms_ns", number(row.model_deviation_ns)},
               {"paper_cycles", number(row.paper_cycles)},
               {"cycles_to_converge", number(median.cycles)},
-              {"passed", row_passed(result, row)},
+              {"passed", row_passed(result.checks, row.name)},
               {"note", row.note},
               {"model_rms_ns", number(row.model_rms_ns)},
               {"paper_min_ns", number(row.paper_min_ns)},
@@ -50,24 +41,6 @@ Json row_json(const CycleResult& result, std::size_t i) {
               {"percentile_95_ns", number(result.figures[i].percentile_95_ns)},
               {"cycles_from_first_message", number(median.cycles_from_first_message)},
               {"runs", result.figures[i].runs.size()}};
-}
-
-Table checks_table(const CycleResult& result) {
-  Table table({"check", "row", "against", "demanded", "measured", ""});
-  for (const PaperCheckResult& check : result.checks) {
-    table.add_row({check.name, check.subject, check.against,
-                   fmt::format("{} .. {}", significant(check.least), significant(check.most)),
-                   Cell::significant(check.measured, 5), check.passed ? "ok" : "FAILED"});
-  }
-  return table;
-}
-
-Table choices_table(const CycleResult& result) {
-  Table table({"the paper does not say", "chosen", "because"});
-  for (const auto& choice : result.choices) {
-    table.add_row({choice.parameter, choice.value, choice.reason});
-  }
-  return table;
 }
 
 Plot figure_plot(const CycleResult& result) {
@@ -112,9 +85,9 @@ Table cycle_table(const CycleResult& result) {
 }
 
 std::string cycle_console(const CycleResult& result) {
-  return fmt::format("{}\n{} seeds\n\n{}\n{}\n\n{}\n{}", kTitle, result.seeds,
-                     cycle_table(result).to_text(), kRemark, choices_table(result).to_text(),
-                     checks_table(result).to_text());
+  return fmt::format(
+      "{}\n{} seeds\n\n{}\n{}\n\n{}\n{}", kTitle, result.seeds, cycle_table(result).to_text(),
+      kRemark, choices_table(result.choices).to_text(), checks_table(result.checks).to_text());
 }
 
 Json cycle_json(const CycleResult& result, const std::string& version) {
@@ -124,26 +97,9 @@ Json cycle_json(const CycleResult& result, const std::string& version) {
     (result.rows[i].support ? support : rows).push_back(row_json(result, i));
   }
   Json checks = Json::array();
-  for (const PaperCheckResult& check : result.checks) {
-    checks.push_back({{"table", "table6"},
-                      {"name", check.name},
-                      {"subject", check.subject},
-                      {"against", check.against},
-                      {"expected", number(check.expected)},
-                      {"least", number(check.least)},
-                      {"most", number(check.most)},
-                      {"measured", number(check.measured)},
-                      {"demanded", check.demanded},
-                      {"passed", check.passed},
-                      {"note", check.note}});
-  }
+  append_checks(checks, "table6", result.checks);
   Json choices = Json::array();
-  for (const auto& choice : result.choices) {
-    choices.push_back({{"table", "table6"},
-                       {"parameter", choice.parameter},
-                       {"value", choice.value},
-                       {"reason", choice.reason}});
-  }
+  append_choices(choices, "table6", result.choices);
   Json traces = Json::array();
   for (const auto& trace : result.traces) {
     traces.push_back(
@@ -165,8 +121,8 @@ std::string cycle_html(const CycleResult& result, const std::string& version) {
   report.add_table(kTitle, cycle_table(result), fmt::format("{} seeds", result.seeds));
   report.add_note(kRemark);
   report.add_plot(figure_plot(result));
-  report.add_table("Choices", choices_table(result));
-  report.add_table("Checks", checks_table(result));
+  report.add_table("Choices", choices_table(result.choices));
+  report.add_table("Checks", checks_table(result.checks));
   report.add_parameters({{"version", version}});
   return report.render();
 }

@@ -5,40 +5,16 @@
 
 #include <fmt/format.h>
 
+#include "ftcs/report/check_report.h"
 #include "ftcs/report/html_report.h"
 #include "ftcs/report/number_format.h"
 
 namespace ftcs {
 namespace {
 
-using experiment::PaperCheckResult;
 using experiment::PaperResult;
 using experiment::PaperRow;
 using experiment::PaperRowResult;
-
-/// The interval on one side only is "at least" or "at most".
-std::string demand_text(const PaperCheckResult& check) {
-  if (std::isnan(check.least) && std::isnan(check.most)) {
-    return std::isnan(check.expected) ? "" : fmt::format("about {}", significant(check.expected));
-  }
-  if (std::isnan(check.most)) return fmt::format(">= {}", significant(check.least));
-  if (std::isnan(check.least)) return fmt::format("<= {}", significant(check.most));
-  if (check.least == check.most) return fmt::format("= {}", significant(check.least));
-  return fmt::format("{} .. {}", significant(check.least), significant(check.most));
-}
-
-std::string verdict(const PaperCheckResult& check) {
-  if (!check.demanded) return "report";
-  return check.passed ? "ok" : "FAILED";
-}
-
-/// A row's own verdict: every demand that speaks of it alone.
-bool row_passed(const PaperResult& result, const PaperRow& row) {
-  for (const auto& check : result.checks) {
-    if (check.subject == row.key() && !check.passed) return false;
-  }
-  return true;
-}
 
 Json row_json(const PaperResult& result, std::size_t i) {
   const PaperRow& row = result.table.rows[i];
@@ -51,7 +27,7 @@ Json row_json(const PaperResult& result, std::size_t i) {
               {"predicted_rms_ns", number(figures.predicted_rms_ns)},
               {"paper_cycles", number(row.paper_cycles)},
               {"cycles_to_converge", number(figures.median_cycles)},
-              {"passed", row_passed(result, row)},
+              {"passed", row_passed(result.checks, row.key())},
               {"note", row.note},
               {"model_rms_ns", number(row.model_rms_ns)},
               {"deviation_ns", number(figures.deviation_ns)},
@@ -62,20 +38,6 @@ Json row_json(const PaperResult& result, std::size_t i) {
               {"cycles_from_first_message", number(figures.median_cycles_from_first_message)},
               {"published_seed_rms_ns", number(figures.published.rms_perceived_ns)},
               {"runs", figures.runs.size()}};
-}
-
-Json check_json(const PaperResult& result, const PaperCheckResult& check) {
-  return Json{{"table", result.table.table},
-              {"name", check.name},
-              {"subject", check.subject},
-              {"against", check.against},
-              {"expected", number(check.expected)},
-              {"least", number(check.least)},
-              {"most", number(check.most)},
-              {"measured", number(check.measured)},
-              {"demanded", check.demanded},
-              {"passed", check.passed},
-              {"note", check.note}};
 }
 
 Plot figure_plot(const PaperResult& result) {
@@ -123,22 +85,6 @@ Table paper_table(const PaperResult& result) {
   return table;
 }
 
-Table paper_checks(const PaperResult& result) {
-  Table table({"check", "row", "against", "demanded", "measured", ""});
-  for (const auto& check : result.checks) {
-    table.add_row({check.name, check.subject, check.against, demand_text(check),
-                   Cell::significant(check.measured, 5), verdict(check)});
-  }
-  return table;
-}
-
-Table paper_choices(const PaperResult& result) {
-  Table table({"the paper does not say", "chosen", "because"});
-  for (const auto& choice : result.table.choices)
-    table.add_row({choice.parameter, choice.value, choice.reason});
-  return table;
-}
-
 std::string paper_console(const PaperResult& result) {
   const auto& table = result.table;
   std::string text = fmt::format(
@@ -149,7 +95,8 @@ std::string paper_console(const PaperResult& result) {
     if (!row.note.empty()) text += fmt::format("{}: {}\n", row.key(), row.note);
   }
   for (const auto& remark : table.remarks) text += remark + "\n";
-  text += "\n" + paper_choices(result).to_text() + "\n" + paper_checks(result).to_text() + "\n";
+  text += "\n" + choices_table(result.table.choices).to_text() + "\n" +
+          checks_table(result.checks).to_text() + "\n";
   for (const auto& check : result.checks) {
     if (!check.note.empty())
       text += fmt::format("{} ({}): {}\n", check.name, check.subject, check.note);
@@ -171,13 +118,8 @@ Json paper_json(const std::vector<PaperResult>& results, const std::string& vers
     for (std::size_t i = 0; i < result.rows.size(); ++i) {
       (result.table.rows[i].support ? others : rows).push_back(row_json(result, i));
     }
-    for (const auto& check : result.checks) checks.push_back(check_json(result, check));
-    for (const auto& choice : result.table.choices) {
-      choices.push_back({{"table", result.table.table},
-                         {"parameter", choice.parameter},
-                         {"value", choice.value},
-                         {"reason", choice.reason}});
-    }
+    append_checks(checks, result.table.table, result.checks);
+    append_choices(choices, result.table.table, result.table.choices);
     for (const auto& trace : result.traces) {
       figures[result.table.figure].push_back({{"row", trace.row},
                                               {"interval_ns", trace.interval_ns},
@@ -205,8 +147,8 @@ std::string paper_html(const std::vector<PaperResult>& results, const std::strin
         fmt::format("{} seeds from {} on", result.table.seeds, result.table.first_seed));
     for (const auto& remark : result.table.remarks) report.add_note(remark);
     if (!result.traces.empty()) report.add_plot(figure_plot(result));
-    report.add_table("Choices", paper_choices(result));
-    report.add_table("Checks", paper_checks(result));
+    report.add_table("Choices", choices_table(result.table.choices));
+    report.add_table("Checks", checks_table(result.checks));
   }
   report.add_parameters({{"version", version}});
   return report.render();

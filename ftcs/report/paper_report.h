@@ -14,10 +14,6 @@ namespace ftcs {
 [[nodiscard]] std::string algorithm_text();
 /// The paper's figure, ours, the ratio, perceived and true, closed form; one row for each servo.
 [[nodiscard]] Table paper_table(const experiment::PaperResult& result);
-/// Every check with what was demanded and what came.
-[[nodiscard]] Table paper_checks(const experiment::PaperResult& result);
-/// What the paper leaves open, what was chosen, and why.
-[[nodiscard]] Table paper_choices(const experiment::PaperResult& result);
 /// All of it for the console.
 [[nodiscard]] std::string paper_console(const experiment::PaperResult& result);
 /// {"tables": {"table2": [...], ...}, "checks": [...], "choices": [...], "figures": {...}}.
