@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "ftcs/ptp/wire/management.h"
+
+namespace ftcs::ptp {
+
+/// What a port tells about itself: IEEE 1588-2019, 8.2, and linuxptp's additions.
+struct ManagedPort {
+  PortIdentity identity{};
+  std::uint8_t domain = 0;
+  std::uint8_t major_sdo_id = 0;
+  ClockDescription description{};
+  UserDescription user{};
+  DefaultDataSet default_set{};
+  CurrentDataSet current{};
+  ParentDataSet parent{};
+  TimePropertiesDataSet time_properties{};
+  PortDataSet port{};
+  TimeStatusNp time_status{};
+  PortDataSetNp port_np{};
+  PortPropertiesNp properties{};
+  PortStatsNp stats{};
+};
+
+struct ManagementCounters {
+  std::uint64_t answered = 0;
+  std::uint64_t refused = 0;    ///< answered with MANAGEMENT_ERROR_STATUS
+  std::uint64_t ignored = 0;    ///< other domain, SDO or clock; nothing that can be asked
+  std::uint64_t malformed = 0;  ///< no management message
+};
+
+/// Answers management messages: GET with a RESPONSE, everything else with an error status, as
+/// nothing can be set. What is addressed to somebody else is not answered (15.3.1).
+///
+/// Sans-I/O; the caller sends what is returned to where the request came from.
+class ManagementResponder {
+ public:
+  [[nodiscard]] std::optional<ManagementBytes> answer(std::span<const std::uint8_t> request,
+                                                      const ManagedPort& port) noexcept;
+  [[nodiscard]] const ManagementCounters& counters() const noexcept { return counters_; }
+
+ private:
+  ManagementCounters counters_{};
+};
+
+}  // namespace ftcs::ptp
