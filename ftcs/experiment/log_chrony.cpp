@@ -39,9 +39,8 @@ std::optional<std::int64_t> parse_date(std::string_view date, std::string_view t
 
 struct ChronyLine {
   std::int64_t time_s = 0;
-  double offset_ns = 0.0;      ///< local minus reference
+  double offset_ns = 0.0;      ///< local minus reference, corrections under way taken as done
   double frequency_ppm = 0.0;  ///< local fast: positive
-  double remaining_ns = 0.0;   ///< not yet slewed of the update before; local minus reference
 };
 
 class ChronyLog final : public LogFormat {
@@ -60,6 +59,10 @@ class ChronyLog final : public LogFormat {
     }
     const auto parsed = parse(line);
     if (!parsed) return "not the columns of this log";
+    const auto fields = split_fields(line, ' ');
+    if (tracking_ && fields[7] == "?") return "chrony was not synchronised";
+    if (!tracking_ && (fields[5] != "111" || fields[6] != "111"))
+      return "the packet failed a test of chrony";
     if (!lines_.empty() && parsed->time_s <= lines_.back().time_s)
       return "its time does not advance";
     lines_.push_back(*parsed);
@@ -71,18 +74,17 @@ class ChronyLog final : public LogFormat {
     log.notes.emplace_back(
         "chrony writes whole seconds: a frequency of f ppm is wrong by up to f us an interval");
     log.notes.emplace_back(
-        tracking_ ? "the free-running clock is rebuilt from offset, remaining correction and "
-                    "frequency"
+        tracking_ ? "the free-running clock is rebuilt from offset and frequency"
                   : "measurements of a clock that chrony steered: without its frequency the "
                     "free-running clock cannot be rebuilt; use tracking.log for that");
     const Duration start = Duration::from_whole_ns(lines_.front().time_s * 1'000'000'000);
     double x_ns = lines_.front().offset_ns;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       if (i > 0 && tracking_) {
-        // What was removed in between is the offset of the line before, less what remained.
+        // The offset is of a clock from which all that is still being slewed has been taken
+        // already: the whole offset of the line before is gone from it, whatever remains.
         const double dt_s = static_cast<double>(lines_[i].time_s - lines_[i - 1].time_s);
-        x_ns +=
-            lines_[i].offset_ns - lines_[i].remaining_ns + lines_[i - 1].frequency_ppm * 1e3 * dt_s;
+        x_ns += lines_[i].offset_ns + lines_[i - 1].frequency_ppm * 1e3 * dt_s;
       } else {
         x_ns = lines_[i].offset_ns;
       }
@@ -108,11 +110,9 @@ class ChronyLog final : public LogFormat {
     }
     const auto frequency = parse_decimal(fields[4]);
     const auto offset = parse_decimal(fields[6]);
-    const auto remaining = parse_decimal(fields[10]);
-    if (!frequency || !offset || !remaining) return std::nullopt;
+    if (!frequency || !offset) return std::nullopt;
     result.frequency_ppm = *frequency;
-    result.offset_ns = *offset * 1e9;         // positive = local fast
-    result.remaining_ns = -*remaining * 1e9;  // positive = local slow
+    result.offset_ns = *offset * 1e9;  // positive = local fast
     return result;
   }
 
