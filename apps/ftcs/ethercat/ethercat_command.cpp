@@ -25,6 +25,7 @@ struct EthercatArguments {
   std::string band = "20us";
   std::string transit = "0";
   std::string gate = "200us";
+  std::string lock = "5us";
   std::string spin = "0";
   std::vector<double> gains;
   bool slew = false;
@@ -78,6 +79,7 @@ Wrong complete(EthercatArguments& arguments) {
   }
   Nanoseconds interval{0};
   Nanoseconds band{0};
+  Nanoseconds lock{0};
   constexpr std::int64_t kShortestCycle = 50'000;
   if (auto wrong = read("--cycle", arguments.cycle, kShortestCycle, servo.cycle)) return wrong;
   if (auto wrong = read("--sync-interval", arguments.sync_interval, 1, interval)) return wrong;
@@ -87,9 +89,12 @@ Wrong complete(EthercatArguments& arguments) {
   if (auto wrong = read("--converged-band", arguments.band, 0, band)) return wrong;
   if (auto wrong = read("--transit", arguments.transit, 0, servo.transit)) return wrong;
   if (auto wrong = read("--gate", arguments.gate, 0, servo.largest_lateness)) return wrong;
+  if (auto wrong = read("--lock-band", arguments.lock, 1, lock)) return wrong;
   if (auto wrong = read("--spin", arguments.spin, 0, options.spin)) return wrong;
   servo.largest_round_trip = servo.largest_lateness;
   servo.band = {band, band};
+  constexpr std::int64_t kLeaveOverEnter = 4;
+  servo.lock.band = {lock, lock * kLeaveOverEnter};
   servo.cycles_per_sync =
       static_cast<std::uint32_t>(std::max<std::int64_t>(1, interval / servo.cycle));
   servo.align_at_start = !arguments.slew;
@@ -191,6 +196,8 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
   command.add_option("--timer-resolution", arguments.resolution, "10us is the paper's timer");
   command.add_option("--transit", arguments.transit, "from the transmit stamp to the reference");
   command.add_option("--gate", arguments.gate, "largest lateness and round trip; default 200us");
+  command.add_option("--lock-band", arguments.lock,
+                     "locked within this phase, lost beyond four times of it; default 5us");
   command.add_flag("--slew", arguments.slew, "the servo removes the first phase, no jump");
   command.add_option("--drift-pulses", options.drift_pulses,
                      "before the first cycle; default 15000");

@@ -52,7 +52,7 @@ MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
   objects_.assign(objects.begin(), objects.end());
   // Lost frames of a shared line shall not fault the drives: six misses in a row do (3 each).
   constexpr std::uint32_t kSyncErrorLimit = 17;
-  objects_.push_back({{0x10F1, 2}, 2, kSyncErrorLimit});
+  objects_.push_back({{0x10F1, 2}, 2, kSyncErrorLimit, false});
   servo_ = std::make_unique<CycleServo>(options.servo);
   if (!options.csv.empty()) csv_.reset(std::fopen(options.csv.c_str(), "w"));
   if (csv_) {

@@ -22,6 +22,12 @@ SyncManagerChannel process_channel(const SubDeviceInfo& device, std::size_t n,
   channel.active = size > 0;
   return channel;
 }
+
+bool can_do_without(const SdoDownload& object, const Failure& failure) noexcept {
+  if (object.required || failure.kind != FailureKind::kSdoAborted) return false;
+  return failure.abort == SdoAbort::kReadOnly || failure.abort == SdoAbort::kNoSuchObject ||
+         failure.abort == SdoAbort::kNoSuchSubindex;
+}
 }  // namespace
 
 void Configurator::start(const ConfiguratorConfig& config) noexcept {
@@ -207,7 +213,11 @@ Progress Configurator::await(const FrameView& frame, SubDeviceInfo& device, AlSt
 
 Progress Configurator::objects(const FrameView& frame, LocalTime now, Failure& failure) noexcept {
   const Progress progress = sdo_.reply(frame, device_, now, failure);
-  if (progress != Progress::kDone) return progress;
+  if (progress == Progress::kFailed && can_do_without(config_.objects[object_], failure)) {
+    failure = Failure{};
+  } else if (progress != Progress::kDone) {
+    return progress;
+  }
   if (++object_ == config_.objects.size()) return Progress::kDone;
   sdo_.start_download(config_.objects[object_], config_.sdo_timeout);
   return Progress::kContinue;

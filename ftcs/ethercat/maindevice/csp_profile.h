@@ -28,6 +28,7 @@ struct InterpolationPeriod {
 
 /// Objects that make a CiA 402 drive ready for cyclic synchronous position with SYNC0: mapping
 /// (controlword, target position, mode; statusword, position, mode), sync type and cycle times.
+/// Many drives find sync type and cycle out by themselves and do not let them be written.
 [[nodiscard]] constexpr std::array<SdoDownload, 21> csp_objects(Nanoseconds cycle) noexcept {
   const auto cycle_ns = static_cast<std::uint32_t>(cycle.count());
   const InterpolationPeriod period = InterpolationPeriod::of(cycle);
@@ -48,10 +49,10 @@ struct InterpolationPeriod {
       {{0x1A00, 0}, 1, 3},
       {{0x1C13, 1}, 2, 0x1A00},
       {{0x1C13, 0}, 1, 1},
-      {{0x1C32, 1}, 2, 2},
-      {{0x1C32, 2}, 4, cycle_ns},
-      {{0x60C2, 1}, 1, period.mantissa},
-      {{0x60C2, 2}, 1, static_cast<std::uint8_t>(period.exponent)},
+      {{0x1C32, 1}, 2, 2, false},
+      {{0x1C32, 2}, 4, cycle_ns, false},
+      {{0x60C2, 1}, 1, period.mantissa, false},
+      {{0x60C2, 2}, 1, static_cast<std::uint8_t>(period.exponent), false},
       {{0x6060, 0}, 1, 8},
   }};
 }

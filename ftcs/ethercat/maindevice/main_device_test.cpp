@@ -223,6 +223,29 @@ TEST(MainDevice, names_what_is_missing_or_wrong) {
   }
 }
 
+TEST(MainDevice, does_without_objects_that_are_not_required) {
+  // Missing, and to be read only: passed over.
+  static constexpr SdoDownload kOptional[] = {{{0x2000, 1}, 2, 0, false},
+                                              {{0x1018, 9}, 4, 0, false},
+                                              {{0x1000, 0}, 4, 0, false},
+                                              {{0x6060, 0}, 1, 8}};
+  MainDeviceConfig config = csp_config();
+  config.process.objects = kOptional;
+  MainBench bench(config);
+  add_drives(bench, 2);
+  bench.bring_up();
+  EXPECT_EQ(bench.main().failure().kind, FailureKind::kNone);
+  EXPECT_TRUE(bench.main().cyclic());
+  // There and refused for another reason: a fault all the same.
+  static constexpr SdoDownload kWrongSize[] = {{{0x6060, 0}, 2, 8, false}};
+  config.process.objects = kWrongSize;
+  MainBench strict(config);
+  add_drives(strict, 2);
+  strict.bring_up();
+  EXPECT_EQ(strict.main().failure().kind, FailureKind::kSdoAborted);
+  EXPECT_EQ(strict.main().failure().abort, SdoAbort::kLengthMismatch);
+}
+
 TEST(MainDevice, ignores_foreign_malformed_and_late_frames) {
   MainBench bench(csp_config());
   add_drives(bench, 1);

@@ -14,6 +14,8 @@ struct SdoDownload {
   ObjectAddress object;
   std::uint8_t size = 0;  ///< 1, 2 or 4 bytes
   std::uint32_t value = 0;
+  /// False: a SubDevice that does not have the object, or has it to be read only, is left as it is.
+  bool required = true;
 };
 
 /// One SDO at a time: writes the request into the SubDevice's receive mailbox and reads its send

@@ -53,6 +53,8 @@ constexpr Entry kEntries[] = {
     {0x1600, 4, 4, kConfigure, 0},
     {0x1600, 5, 4, kConfigure, 0},
     {0x1600, 6, 4, kConfigure, 0},
+    {0x1600, 7, 4, kConfigure, 0},
+    {0x1600, 8, 4, kConfigure, 0},
     {0x1A00, 0, 1, kConfigure, 3},
     {0x1A00, 1, 4, kConfigure, map_entry(obj::kStatusword, 16)},
     {0x1A00, 2, 4, kConfigure, map_entry(obj::kPositionActual, 32)},
@@ -60,6 +62,8 @@ constexpr Entry kEntries[] = {
     {0x1A00, 4, 4, kConfigure, 0},
     {0x1A00, 5, 4, kConfigure, 0},
     {0x1A00, 6, 4, kConfigure, 0},
+    {0x1A00, 7, 4, kConfigure, 0},
+    {0x1A00, 8, 4, kConfigure, 0},
     {0x1C00, 0, 1, kRead, 4},
     {0x1C00, 1, 1, kRead, 1},
     {0x1C00, 2, 1, kRead, 2},
@@ -124,7 +128,7 @@ static_assert(kCount <= ObjectDictionary::kCapacity);
 constexpr std::size_t kNotFound = kCount;
 
 constexpr std::size_t kMaxAssigned = 1;
-constexpr std::uint32_t kMaxMapped = 6;
+constexpr std::uint32_t kMaxMapped = 8;
 
 std::size_t find(ObjectAddress object) noexcept {
   for (std::size_t i = 0; i < kCount; ++i) {
@@ -147,6 +151,10 @@ ObjectAddress address_in(std::uint32_t mapped) noexcept {
   return {static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)};
 }
 std::size_t bytes_in(std::uint32_t mapped) noexcept { return (mapped & 0xFFU) / 8; }
+/// Index 0 pads: nothing is behind it. Here in whole bytes.
+bool is_gap(std::uint32_t mapped) noexcept {
+  return address_in(mapped).index == 0 && (mapped & 0xFFU) > 0 && (mapped & 7U) == 0;
+}
 
 }  // namespace
 
@@ -176,6 +184,7 @@ SdoAbort ObjectDictionary::check_mapping(std::uint16_t map, std::uint32_t count)
   if (count > kMaxMapped) return SdoAbort::kMappingTooLong;
   for (std::uint32_t n = 1; n <= count; ++n) {
     const std::uint32_t mapped = get({map, static_cast<std::uint8_t>(n)});
+    if (is_gap(mapped)) continue;
     const std::size_t at = find(address_in(mapped));
     if (at == kNotFound || kEntries[at].size != bytes_in(mapped)) return SdoAbort::kCannotBeMapped;
   }

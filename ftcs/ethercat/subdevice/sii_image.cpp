@@ -105,7 +105,7 @@ void put_general(Appender& out) noexcept {
   out.begin(sii::kGeneral);
   for (const std::uint8_t value :
        {std::uint8_t{1}, std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{0},
-        std::uint8_t{1}, std::uint8_t{0}, std::uint8_t{kSdo | kAssignAndConfigure}}) {
+        std::uint8_t{kSdo | kAssignAndConfigure}, std::uint8_t{0}, std::uint8_t{0}}) {
     out.put(value);
   }
   for (int i = 0; i < 24; ++i) out.put(std::uint8_t{0});

@@ -229,6 +229,44 @@ TEST(SiiImage, of_a_drive_decodes_without_an_error) {
   EXPECT_TRUE(content->coe());
 }
 
+// ETG.2010, category 30: CoE details at byte 5, EoE details at 7, flags at 11.
+TEST(SiiImage, general_category_lies_where_other_masters_look_for_it) {
+  SiiImage image = make_drive_image({1, 2, 3, 4}, 0, true);
+  std::size_t at = sii::kCategoriesWord * 2;
+  while (load<std::uint16_t>(image, at) != sii::kGeneral) {
+    at += 4U + 2U * load<std::uint16_t>(image, at + 2);
+  }
+  const Bytes general = Bytes{image}.subspan(at + 4, 32);
+  EXPECT_EQ(general[5], 0x0D) << "SDO, PDO assignment and configuration";
+  EXPECT_EQ(general[6], 0) << "no FoE";
+  EXPECT_EQ(general[7], 0) << "no EoE";
+  EXPECT_EQ(decode_sii(image)->coe_details, 0x0D);
+  EXPECT_TRUE(decode_sii(image)->logical_read_write_supported);
+  general[11] = 0x02;
+  EXPECT_FALSE(decode_sii(image)->logical_read_write_supported);
+}
+
+TEST_F(OneDevice, a_mapping_may_hold_gaps_of_whole_bytes) {
+  to_preop();
+  const auto map = [this](std::uint8_t subindex, std::uint32_t entry) {
+    std::vector<std::uint8_t> data(4);
+    store(Bytes{data}, 0, entry);
+    write_object({0x1A00, subindex}, data);
+  };
+  write_object({0x1A00, 0}, {0});
+  std::uint8_t n = 0;
+  for (const std::uint32_t entry : {0x60410010U, 0x60610008U, 0x00000008U, 0x60640020U, 0x606C0020U,
+                                    0x60770010U, 0x603F0010U}) {
+    map(++n, entry);
+  }
+  write_object({0x1A00, 0}, {n});
+  write_object({0x1A00, 0}, {0});
+  map(3, 0x00000007);
+  EXPECT_EQ(sdo(SdoKind::kDownloadRequest, {0x1A00, 0}, {n}).abort, SdoAbort::kCannotBeMapped);
+  map(3, 0x00000000);
+  EXPECT_EQ(sdo(SdoKind::kDownloadRequest, {0x1A00, 0}, {n}).abort, SdoAbort::kCannotBeMapped);
+}
+
 TEST_F(OneDevice, refuses_illegal_and_unknown_states_and_wants_the_error_acknowledged) {
   request_state(8);
   expect_state(0x11, AlStatusCode::kInvalidRequestedStateChange);

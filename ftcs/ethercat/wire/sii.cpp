@@ -31,8 +31,8 @@ ConstBytes find_string(ConstBytes strings, std::uint8_t number) noexcept {
 
 void decode_general(SiiContent& content, ConstBytes general, std::uint8_t& name_index) noexcept {
   constexpr std::size_t kNameIndexAt = 3;
-  constexpr std::size_t kCoeDetailsAt = 7;
-  constexpr std::size_t kFlagsAt = 0x0D;
+  constexpr std::size_t kCoeDetailsAt = 5;
+  constexpr std::size_t kFlagsAt = 0x0B;
   constexpr std::uint8_t kNotLrw = 0x02;
   if (general.size() <= kFlagsAt) return;
   name_index = general[kNameIndexAt];
