@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "apps/ftcs/ptp_receiver.h"
 
-#include <cerrno>
-#include <cmath>
-#include <cstring>
 #include <utility>
 #include <variant>
 
@@ -11,10 +8,6 @@
 
 namespace ftcs::app {
 namespace {
-
-// A slew over more than this would take long enough to look like a fault: the user must ask for a
-// step.
-constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
 
 ptp::TimeReceiverConfig core_config(const PtpOptions& options, const ptp::PortIdentity& identity,
                                     std::uint64_t seed) {
@@ -32,32 +25,6 @@ ptp::TimeReceiverConfig core_config(const PtpOptions& options, const ptp::PortId
   return config;
 }
 
-StepPolicy step_policy(const PtpOptions& options) {
-  // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
-  // for.
-  if (options.servo.kind == ServoKind::kLinuxptpPi) {
-    if (options.step_threshold > Nanoseconds{0}) return {StepMode::kAlways, options.step_threshold};
-    if (options.first_step_threshold > Nanoseconds{0}) {
-      return {StepMode::kFirst, options.first_step_threshold};
-    }
-    return {};
-  }
-  if (!options.first_step) return {};
-  return {StepMode::kFirst, options.first_step_threshold};
-}
-
-DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps) {
-  DisciplineConfig config;
-  config.servo = options.servo;
-  config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
-  config.servo.linuxptp_pi.step_threshold = options.step_threshold;
-  config.servo.linuxptp_pi.timestamping =
-      hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
-  config.step = step_policy(options);
-  config.largest_first_offset = kLargestFirstOffset;
-  return config;
-}
-
 }  // namespace
 
 PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
@@ -66,7 +33,8 @@ PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Lo
     : PtpCorePort(kernel, options, log, std::move(timestamps),
                   core_config(options, identity,
                               static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW)))),
-      discipline_(discipline_config(options, has_hardware_stamps()), clock()) {}
+      follower_(this->options(), log, clock(), now(), has_hardware_stamps(),
+                "port 1 (" + options.interface + ")") {}
 
 ptp::ActionList PtpReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
@@ -84,7 +52,7 @@ void PtpReceiver::act(const ptp::Action& action) {
   } else if (const auto* jumped = std::get_if<ptp::ReferenceJumped>(&action)) {
     log()(LogLevel::kWarning, "port 1 ({}): the reference jumped by {:.9f} s; starting anew",
           options().interface, jumped->jump.seconds());
-    discipline_.on_new_reference();
+    follower_.on_new_reference();
   }
 }
 
@@ -95,71 +63,15 @@ void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
   if ((selected.transmitter.flags & ptp::flag::kPtpTimescale) == 0) {
     log()(LogLevel::kNotice, "foreign master not using PTP timescale");
   }
-  if (had_transmitter_) discipline_.on_new_reference();
+  if (had_transmitter_) follower_.on_new_reference();
   had_transmitter_ = true;
 }
 
 void PtpReceiver::on_pair(const EventPair& pair) {
-  const LocalTime local = clock().local_at(pair.free_running);
-  const Telemetry telemetry = discipline_.on_pair(pair);
-  if (telemetry.offset_refused) {
-    return fail(
-        fmt::format("the first offset is {:.3f} s, more than {} s: set the clock near the "
-                    "reference (--offset) or allow one step (--first-step)",
-                    telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9));
+  if (const auto wrong = follower_.on_pair(pair, now(), core().sync_interval())) {
+    return fail(*wrong);
   }
-  if (pair.direction == Direction::kForward) {
-    SampleRecord record;
-    record.time_s = seconds_since_start();
-    record.offset_known = telemetry.servo.offset_known;
-    record.offset = telemetry.verdict == SampleVerdict::kUsed
-                        ? telemetry.servo.offset
-                        : offset_from_reference(local, pair.reference + telemetry.servo.path_delay);
-    record.telemetry = telemetry;
-    report(record);
-  }
-  follow_lock(telemetry.locked);
-}
-
-void PtpReceiver::report(const SampleRecord& record) {
-  switch (options().output) {
-    case Output::kText:
-      break;
-    case Output::kJson:
-      fmt::print("{}\n", json_line(record));
-      break;
-    case Output::kCsv:
-      fmt::print("{}\n", csv_line(record));
-      break;
-  }
-  if (options().output != Output::kText && std::fflush(stdout) != 0) {
-    return fail(fmt::format("standard output: {}", std::strerror(errno)));
-  }
-  if (!record.offset_known) return;
-  if (record.telemetry.locked && record.telemetry.verdict == SampleVerdict::kUsed) {
-    since_lock_.add(record);
-  }
-  report_text(record);
-}
-
-void PtpReceiver::report_text(const SampleRecord& record) {
-  const std::uint64_t per_summary = samples_per_summary();
-  if (per_summary < 2 || record.telemetry.verdict != SampleVerdict::kUsed) {
-    log()(LogLevel::kInfo, "{}", ptp4l_line(record));
-    return;
-  }
-  recent_.add(record);
-  if (recent_.count() < per_summary) return;
-  log()(LogLevel::kInfo, "{}", recent_.text());
-  recent_.reset();
-}
-
-// As ptp4l: 2^(summary_interval - logSyncInterval) samples.
-std::uint64_t PtpReceiver::samples_per_summary() const {
-  const auto interval = core().sync_interval();
-  if (!interval || *interval <= Duration{}) return 1;
-  const double samples = std::exp2(options().summary_interval) / interval->seconds();
-  return samples < 2.0 ? 1 : static_cast<std::uint64_t>(samples);
+  follow_lock(follower_.locked());
 }
 
 // From the port's state and not from a change of the lock: after a fault shorter than the lock's
@@ -173,26 +85,14 @@ void PtpReceiver::follow_lock(bool locked) {
 }
 
 void PtpReceiver::housekeeping(FreeRunningTime) {
-  const Telemetry telemetry = discipline_.on_silence();
-  const bool holdover = telemetry.servo.state == ServoState::kHoldover;
-  if (holdover && !in_holdover_) {
-    log()(LogLevel::kWarning, "port 1 ({}): no Sync for a while; keeping the last rate (holdover)",
-          options().interface);
-  }
-  in_holdover_ = holdover;
-  if (!telemetry.locked) follow_lock(false);  // only a sample can say that it is locked again
+  follower_.on_silence();
+  if (!follower_.locked()) follow_lock(false);  // only a sample can say that it is locked again
 }
 
 int PtpReceiver::finish() {
-  const DisciplineCounters& counters = discipline_.counters();
-  const bool locked = discipline_.locked();
-  log()(LogLevel::kNotice, "summary: {}, {} samples used, {} rejected, {} steps",
-        locked ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
-  if (since_lock_.count() > 0) {
-    log()(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
-  }
+  follower_.log_summary();
   log_unusual(core().counters());
-  return locked ? kSuccess : kNotLocked;
+  return follower_.locked() ? kSuccess : kNotLocked;
 }
 
 }  // namespace ftcs::app

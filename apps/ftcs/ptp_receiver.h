@@ -3,9 +3,8 @@
 
 #include <memory>
 
+#include "apps/ftcs/clock_follower.h"
 #include "apps/ftcs/ptp_core_port.h"
-#include "apps/ftcs/sample_report.h"
-#include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/ptp/time_receiver.h"
 
 namespace ftcs::app {
@@ -25,16 +24,10 @@ class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver> {
 
   void on_pair(const EventPair& pair);
   void on_selected(const ptp::TransmitterSelected& selected);
-  void report(const SampleRecord& record);
-  void report_text(const SampleRecord& record);
   void follow_lock(bool locked);
-  [[nodiscard]] std::uint64_t samples_per_summary() const;
 
-  ClockDiscipline discipline_;
-  SampleSummary recent_;
-  SampleSummary since_lock_;
+  ClockFollower follower_;
   bool had_transmitter_ = false;
-  bool in_holdover_ = false;
 };
 
 }  // namespace ftcs::app

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/clock_follower.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+namespace ftcs::app {
+namespace {
+
+// A slew over more than this would take long enough to look like a fault: the user must ask for a
+// step.
+constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
+constexpr std::size_t kKeptRefusals = 8;
+
+StepPolicy step_policy(const PtpOptions& options) {
+  // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
+  // for.
+  if (options.servo.kind == ServoKind::kLinuxptpPi) {
+    if (options.step_threshold > Nanoseconds{0}) return {StepMode::kAlways, options.step_threshold};
+    if (options.first_step_threshold > Nanoseconds{0}) {
+      return {StepMode::kFirst, options.first_step_threshold};
+    }
+    return {};
+  }
+  if (!options.first_step) return {};
+  return {StepMode::kFirst, options.first_step_threshold};
+}
+
+DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps) {
+  DisciplineConfig config;
+  config.servo = options.servo;
+  config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
+  config.servo.linuxptp_pi.step_threshold = options.step_threshold;
+  config.servo.linuxptp_pi.timestamping =
+      hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
+  config.step = step_policy(options);
+  config.largest_first_offset = kLargestFirstOffset;
+  return config;
+}
+
+}  // namespace
+
+ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableClock& clock,
+                             FreeRunningTime start, bool hardware_stamps, std::string label)
+    : options_(options),
+      log_(log),
+      clock_(clock),
+      start_(start),
+      label_(std::move(label)),
+      discipline_(discipline_config(options, hardware_stamps), clock) {}
+
+std::optional<std::string> ClockFollower::on_pair(const EventPair& pair, FreeRunningTime now,
+                                                  std::optional<Duration> sync_interval) {
+  const LocalTime local = clock_.local_at(pair.free_running);
+  const Telemetry telemetry = discipline_.on_pair(pair);
+  if (telemetry.offset_refused) {
+    return fmt::format(
+        "the first offset is {:.3f} s, more than {} s: set the clock near the "
+        "reference (--offset) or allow one step (--first-step)",
+        telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9);
+  }
+  const double time_s = (now - start_).seconds();
+  const bool used = telemetry.verdict == SampleVerdict::kUsed;
+  const bool forward = pair.direction == Direction::kForward;
+  const Duration perceived =
+      offset_from_reference(local, pair.reference + telemetry.servo.path_delay);
+  if (!used) {
+    const bool known = forward && telemetry.servo.offset_known;
+    note_refusal(telemetry, time_s, known ? std::optional(perceived.ns()) : std::nullopt);
+  }
+  std::optional<std::string> failure;
+  if (forward) {
+    SampleRecord record;
+    record.time_s = time_s;
+    record.offset_known = telemetry.servo.offset_known;
+    record.offset = used ? telemetry.servo.offset : perceived;
+    record.telemetry = telemetry;
+    if (used) {
+      status_.last = record;
+      status_.has_sample = true;
+      status_.last_local = local;
+      last_used_ = pair.free_running;
+    }
+    failure = report(record, sync_interval);
+  }
+  follow_lock(now);
+  return failure;
+}
+
+void ClockFollower::on_silence() {
+  const Telemetry telemetry = discipline_.on_silence();
+  const bool holdover = telemetry.servo.state == ServoState::kHoldover;
+  if (holdover && !in_holdover_) {
+    log_(LogLevel::kWarning, "{}: no Sync for a while; keeping the last rate (holdover)", label_);
+  }
+  in_holdover_ = holdover;
+  follow_lock(telemetry.reading.free_running);
+}
+
+void ClockFollower::follow_lock(FreeRunningTime now) {
+  if (!locked()) {
+    locked_since_.reset();
+  } else if (!locked_since_) {
+    locked_since_ = now;
+  }
+}
+
+void ClockFollower::note_refusal(const Telemetry& telemetry, double time_s,
+                                 std::optional<double> offset_ns) {
+  status_.refusals.push_back({time_s, telemetry.verdict, offset_ns});
+  if (status_.refusals.size() > kKeptRefusals) status_.refusals.pop_front();
+}
+
+ClockFollower::Status ClockFollower::status(FreeRunningTime now) const {
+  Status status = status_;
+  if (status.has_sample) status.last_age_s = (now - last_used_).seconds();
+  if (locked_since_) status.locked_for_s = (now - *locked_since_).seconds();
+  if (since_lock_.count() > 0) status.since_lock = since_lock_.text();
+  return status;
+}
+
+std::optional<std::string> ClockFollower::report(const SampleRecord& record,
+                                                 std::optional<Duration> sync_interval) {
+  switch (options_.output) {
+    case Output::kText:
+      break;
+    case Output::kJson:
+      fmt::print("{}\n", json_line(record));
+      break;
+    case Output::kCsv:
+      fmt::print("{}\n", csv_line(record));
+      break;
+  }
+  if (options_.output != Output::kText && std::fflush(stdout) != 0) {
+    return fmt::format("standard output: {}", std::strerror(errno));
+  }
+  if (!record.offset_known) return std::nullopt;
+  if (record.telemetry.locked && record.telemetry.verdict == SampleVerdict::kUsed) {
+    since_lock_.add(record);
+  }
+  report_text(record, sync_interval);
+  return std::nullopt;
+}
+
+void ClockFollower::report_text(const SampleRecord& record, std::optional<Duration> sync_interval) {
+  const std::uint64_t per_summary = samples_per_summary(sync_interval);
+  if (per_summary < 2 || record.telemetry.verdict != SampleVerdict::kUsed) {
+    log_(LogLevel::kInfo, "{}", ptp4l_line(record));
+    return;
+  }
+  recent_.add(record);
+  if (recent_.count() < per_summary) return;
+  log_(LogLevel::kInfo, "{}", recent_.text());
+  recent_.reset();
+}
+
+// As ptp4l: 2^(summary_interval - logSyncInterval) samples.
+std::uint64_t ClockFollower::samples_per_summary(std::optional<Duration> sync_interval) const {
+  if (!sync_interval || *sync_interval <= Duration{}) return 1;
+  const double samples = std::exp2(options_.summary_interval) / sync_interval->seconds();
+  return samples < 2.0 ? 1 : static_cast<std::uint64_t>(samples);
+}
+
+void ClockFollower::log_summary() {
+  const DisciplineCounters& counters = discipline_.counters();
+  log_(LogLevel::kNotice, "summary: {}, {} samples used, {} rejected, {} steps",
+       locked() ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
+  if (since_lock_.count() > 0) {
+    log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
+  }
+}
+
+}  // namespace ftcs::app

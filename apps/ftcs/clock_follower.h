@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "apps/ftcs/log.h"
+#include "apps/ftcs/ptp_options.h"
+#include "apps/ftcs/sample_report.h"
+#include "ftcs/discipline/clock_discipline.h"
+
+namespace ftcs::app {
+
+/// The half of a time receiver that stands behind the source of its timestamps: the discipline of
+/// the steered clock, the record of each sample, lock and holdover, summaries.
+class ClockFollower {
+ public:
+  /// The clock must outlive the follower. `label` begins log lines: "port 1 (eth0)".
+  ClockFollower(const PtpOptions& options, Log& log, AdjustableClock& clock, FreeRunningTime start,
+                bool hardware_stamps, std::string label);
+
+  /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
+  [[nodiscard]] std::optional<std::string> on_pair(const EventPair& pair, FreeRunningTime now,
+                                                   std::optional<Duration> sync_interval);
+  /// Once per turn of the loop.
+  void on_silence();
+  /// Another reference: what was learnt about the old one is void.
+  void on_new_reference() { discipline_.on_new_reference(); }
+  /// The summary's lines.
+  void log_summary();
+
+  [[nodiscard]] bool locked() const { return discipline_.locked(); }
+  [[nodiscard]] const ClockDiscipline& discipline() const { return discipline_; }
+
+  /// A message that did not steer, and why.
+  struct Refusal {
+    double time_s = 0.0;
+    SampleVerdict verdict = SampleVerdict::kRejected;
+    std::optional<double> offset_ns{};
+  };
+  /// What is known now, for whoever asks.
+  struct Status {
+    SampleRecord last{};  ///< the last Sync that was used
+    bool has_sample = false;
+    LocalTime last_local{};  ///< when it came, on the steered clock
+    double last_age_s = 0.0;
+    std::optional<double> locked_for_s{};  ///< none: not locked
+    std::deque<Refusal> refusals{};        ///< the latest ones, oldest first
+    std::string since_lock{};              ///< ptp4l's summary of all samples since the first lock
+  };
+  [[nodiscard]] Status status(FreeRunningTime now) const;
+
+ private:
+  [[nodiscard]] std::optional<std::string> report(const SampleRecord& record,
+                                                  std::optional<Duration> sync_interval);
+  void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
+  void note_refusal(const Telemetry& telemetry, double time_s, std::optional<double> offset_ns);
+  void follow_lock(FreeRunningTime now);
+  [[nodiscard]] std::uint64_t samples_per_summary(std::optional<Duration> sync_interval) const;
+
+  const PtpOptions& options_;
+  Log& log_;
+  AdjustableClock& clock_;
+  FreeRunningTime start_;
+  std::string label_;
+  ClockDiscipline discipline_;
+  SampleSummary recent_;
+  SampleSummary since_lock_;
+  bool in_holdover_ = false;
+  Status status_;
+  FreeRunningTime last_used_{};
+  std::optional<FreeRunningTime> locked_since_{};
+};
+
+}  // namespace ftcs::app
