@@ -1,5 +1,5 @@
 # make            build build/ftcs
-# make demo       install what is missing, build, watch a clock being locked
+# make demo       install what is missing, build, watch a clock and eight drives being locked; build/demo.html
 # make test       install what is missing, build, test (at most 5 minutes after the build)
 # make test-all   everything, long runs too
 # make bench      nanoseconds and instructions per update, allocations
@@ -29,7 +29,7 @@ build: configure
 	@cmake --build build -j $(JOBS) --target ftcs
 
 demo: build
-	@build/ftcs demo $(DEMO_FLAGS)
+	@build/ftcs demo --html build/demo.html $(DEMO_FLAGS)
 
 test: deps-test configure
 	@cmake --build build -j $(JOBS)

@@ -12,6 +12,7 @@
 #include "apps/ftcs/servo_trial.h"
 #include "ftcs/platform/child_process.h"
 #include "ftcs/ptp/time_receiver.h"
+#include "ftcs/report/table.h"
 
 namespace ftcs::app {
 
@@ -24,6 +25,14 @@ struct DemoOptions {
   std::uint16_t event_port =
       0;                  ///< 0: chosen from the process number, and the next one for general
   bool live_view = true;  ///< on a terminal only
+  bool ptp = true;
+  bool ethercat = true;
+};
+
+/// Where the figures go; empty: nowhere.
+struct DemoFiles {
+  std::string json;
+  std::string html;
 };
 
 struct DemoResult {
@@ -32,6 +41,7 @@ struct DemoResult {
   double lock_band_ns = 0.0;   ///< common to all servos: 5 x 1.4826 x MAD of the link's t2 - t1
   double link_delay_ns = 0.0;  ///< median of t2 - t1 on the common oscillator
   std::uint64_t samples = 0;
+  bool interrupted = false;  ///< stopped before its time was up
   std::vector<TrialResult> servos;
 };
 
@@ -72,14 +82,22 @@ class DemoReceiver final : public PtpPort {
   std::vector<std::unique_ptr<ServoTrial>> trials_;
   std::vector<double> one_way_ns_;  // t2 - t1 of every Sync, both on the common oscillator
   LiveView view_;
+  bool interrupted_ = false;
 };
 
-/// Runs both processes; prints table and sentences. Returns an exit code: locked (FTCS) or not.
-[[nodiscard]] int run_demo(const DemoOptions& options, const std::string& json_file);
+struct EthercatDemo;
+
+/// Runs both parts; prints tables and sentences. Returns an exit code: both locked or not.
+[[nodiscard]] int run_demo(const DemoOptions& options, const DemoFiles& files);
 
 /// Table and what it means, for people.
 [[nodiscard]] std::string demo_text(const DemoOptions& options, const DemoResult& result);
-/// Field names: docs/demo.md.
-[[nodiscard]] std::string demo_json(const DemoOptions& options, const DemoResult& result);
+[[nodiscard]] Table demo_table(const DemoResult& result);
+[[nodiscard]] std::string demo_method(const DemoOptions& options, const DemoResult& result);
+/// Field names: docs/demo.md. A part that did not run is left out.
+[[nodiscard]] std::string demo_json(const DemoOptions& options, const DemoResult* result,
+                                    const EthercatDemo* ethercat);
+[[nodiscard]] std::string demo_html(const DemoOptions& options, const DemoResult* result,
+                                    const EthercatDemo* ethercat);
 
 }  // namespace ftcs::app

@@ -8,6 +8,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/demo.h"
+#include "apps/ftcs/demo_ethercat.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/ptp_transmitter.h"
 #include "apps/ftcs/units.h"
@@ -90,7 +91,8 @@ struct DemoArguments {
   DemoOptions options;
   std::string offset;
   std::string skew;
-  std::string json_file;
+  DemoFiles files;
+  std::string part = "both";
 };
 
 std::optional<std::string> complete(DemoArguments& arguments) {
@@ -115,7 +117,10 @@ std::optional<std::string> complete(DemoArguments& arguments) {
 
 }  // namespace
 
-int run_demo(const DemoOptions& demo, const std::string& json_file) {
+namespace {
+
+/// The PTP half; a message and an exit code if it could not be shown.
+int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
   platform::LinuxKernel kernel;
   PtpOptions options = port_options(kernel, demo);
   if (const auto error = port_in_use(kernel, options.socket.event_port)) {
@@ -140,30 +145,68 @@ int run_demo(const DemoOptions& demo, const std::string& json_file) {
   const std::string timestamps = clock->is_hardware() ? "hardware" : "kernel software";
   DemoReceiver receiver(kernel, options, demo, log, std::move(clock), *transmitter);
   if (const int code = receiver.run(); code != kSuccess) return code;
-
-  DemoResult result = receiver.result();
+  result = receiver.result();
   result.timestamps = timestamps;
   fmt::print("{}", demo_text(demo, result));
-  if (!json_file.empty()) {
-    if (const auto error = write_file(json_file, demo_json(demo, result))) {
-      fmt::print(stderr, "ftcs demo: {}\n", error->message);
-      return kRuntimeError;
-    }
+  std::fflush(stdout);
+  return kSuccess;
+}
+
+int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResult* result,
+                const EthercatDemo* ethercat) {
+  bool written = true;
+  const auto write = [&written](const std::string& file, const std::string& content) {
+    const auto error = write_file(file, content);
+    if (error) fmt::print(stderr, "ftcs demo: {}\n", error->message);
+    written &= !error;
+  };
+  if (!files.json.empty()) write(files.json, demo_json(demo, result, ethercat));
+  if (!files.html.empty()) write(files.html, demo_html(demo, result, ethercat));
+  if (!files.html.empty() && written) fmt::print("\nreport: {}\n", files.html);
+  return written ? kSuccess : kRuntimeError;
+}
+
+}  // namespace
+
+int run_demo(const DemoOptions& demo, const DemoFiles& files) {
+  DemoResult result;
+  if (demo.ptp) {
+    if (const int code = run_ptp_demo(demo, result); code != kSuccess) return code;
   }
-  return result.servos.front().locked ? kSuccess : kNotLocked;
+  std::unique_ptr<EthercatDemo> ethercat;
+  if (demo.ethercat && !result.interrupted) {
+    // Four runs, which with the PTP half take less than three times its time.
+    constexpr double kPartOfDuration = 0.3;
+    ethercat = run_ethercat_demo({demo.duration_s * kPartOfDuration, demo.live_view});
+    if (ethercat == nullptr) return kRuntimeError;
+    fmt::print("{}", ethercat_demo_text(*ethercat));
+  }
+  const int code = write_files(demo, files, demo.ptp ? &result : nullptr, ethercat.get());
+  if (code != kSuccess) return code;
+  const bool ptp_locked = !demo.ptp || result.servos.front().locked;
+  const bool ethercat_locked =
+      ethercat == nullptr ||
+      (!ethercat->runs.empty() && ethercat->runs.front()->decision().state == CycleState::kLocked);
+  return ptp_locked && ethercat_locked ? kSuccess : kNotLocked;
 }
 
 void add_demo_command(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand(
-      "demo",
-      "lock a clock to another over PTP on this machine: no root, no configuration, truth known");
+  CLI::App* command = app.add_subcommand("demo",
+                                         "lock a clock over PTP, then eight EtherCAT drives, on "
+                                         "this machine: no root, no configuration");
   const auto arguments = std::make_shared<DemoArguments>();
   DemoOptions& options = arguments->options;
-  command->add_option("--duration", options.duration_s, "default 20")
+  command
+      ->add_option("--duration", options.duration_s,
+                   "of the PTP half, default 20; each EtherCAT run takes three tenths of it")
       ->type_name("SECONDS")
       ->check(number_from(3, 86'400));
-  command->add_option("--json", arguments->json_file, "write the figures to this file")
+  command->add_option("--json", arguments->files.json, "write the figures to this file")
       ->type_name("FILE");
+  command->add_option("--html", arguments->files.html, "write a report with plots to this file")
+      ->type_name("FILE");
+  command->add_option("--part", arguments->part, "both (default), ptp or ethercat")
+      ->check(CLI::IsMember({"both", "ptp", "ethercat"}));
   command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms")
       ->type_name("TIME");
   command->add_option("--skew", arguments->skew, "of its oscillator; default 50ppm")
@@ -186,8 +229,10 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
+    arguments->options.ptp = arguments->part != "ethercat";
+    arguments->options.ethercat = arguments->part != "ptp";
     arguments->options.live_view = arguments->options.live_view && isatty(STDOUT_FILENO) == 1;
-    exit_code = run_demo(arguments->options, arguments->json_file);
+    exit_code = run_demo(arguments->options, arguments->files);
   });
 }
 

@@ -124,7 +124,8 @@ int DemoReceiver::finish() {
           seconds_since_start());
     return kRuntimeError;
   }
-  if (seconds_since_start() < demo_.duration_s) {
+  interrupted_ = seconds_since_start() < demo_.duration_s;
+  if (interrupted_) {
     log()(LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
           seconds_since_start(), demo_.duration_s);
   }
@@ -140,6 +141,7 @@ DemoResult DemoReceiver::result() const {
   result.link_delay_ns = one_way.median;
   result.lock_band_ns = kBandInSigma * kSigmaPerMad * one_way.median_absolute_deviation;
   result.samples = one_way_ns_.size();
+  result.interrupted = interrupted_;
   for (const auto& trial : trials_) result.servos.push_back(trial->result(result.lock_band_ns));
   return result;
 }

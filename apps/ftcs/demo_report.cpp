@@ -4,12 +4,13 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/demo.h"
+#include "apps/ftcs/demo_ethercat.h"
 #include "ftcs/report/json.h"
 #include "ftcs/report/table.h"
 
 namespace ftcs::app {
 
-std::string demo_text(const DemoOptions& options, const DemoResult& result) {
+Table demo_table(const DemoResult& result) {
   Table table({"servo", "locked", "cycles to lock", "true error, RMS", "offset it sees, RMS",
                "rate error, RMS", "excursions", "rejected"});
   for (const TrialResult& servo : result.servos) {
@@ -19,22 +20,29 @@ std::string demo_text(const DemoOptions& options, const DemoResult& result) {
                    fmt::format("{:.3f} ppm", servo.rate_error_ppb * 1e-3),
                    Cell::count(servo.excursions), Cell::count(servo.rejected)});
   }
-  std::string text = fmt::format(
-      "\nTwo processes, real PTP messages over loopback, {} timestamps, {} Sync messages, one "
+  return table;
+}
+
+std::string demo_method(const DemoOptions& options, const DemoResult& result) {
+  return fmt::format(
+      "Two processes, real PTP messages over loopback, {} timestamps, {} Sync messages, one "
       "every {}.\n"
       "Start: {} of offset, {:g} ppm of skew; rate limit ±{:g} ppm; nobody may step.\n"
       "Locked: true offset inside ±{} (5 x 1.4826 x MAD of t2 - t1) for {} Syncs, counted from the "
       "servo's first "
-      "action.\nRMS figures from lock to the end of the run (not locked: its second half).\n\n",
+      "action.\nRMS figures from lock to the end of the run (not locked: its second half).\n",
       result.timestamps, result.samples, format_time(result.sync_interval_ns),
       format_time(options.offset.ns()), options.skew_ppb * 1e-3, options.max_frequency_ppb * 1e-3,
       format_time(result.lock_band_ns), ServoTrial::kLockDwell);
-  return text + table.to_text();
 }
 
-std::string demo_json(const DemoOptions& options, const DemoResult& result) {
-  Json root;
-  root["duration_s"] = options.duration_s;
+std::string demo_text(const DemoOptions& options, const DemoResult& result) {
+  return "\n" + demo_method(options, result) + "\n" + demo_table(result).to_text();
+}
+
+namespace {
+
+void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
   root["sync_interval_ns"] = result.sync_interval_ns;
   root["initial_offset_ns"] = options.offset.ns();
   root["skew_ppb"] = options.skew_ppb;
@@ -58,6 +66,16 @@ std::string demo_json(const DemoOptions& options, const DemoResult& result) {
     row["rejected"] = servo.rejected;
     root["ptp"].push_back(row);
   }
+}
+
+}  // namespace
+
+std::string demo_json(const DemoOptions& options, const DemoResult* result,
+                      const EthercatDemo* ethercat) {
+  Json root;
+  root["duration_s"] = options.duration_s;
+  if (result != nullptr) add_ptp(root, options, *result);
+  if (ethercat != nullptr) root["ethercat"] = ethercat_demo_json(*ethercat);
   return dump(root);
 }
 

@@ -73,6 +73,7 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   result.locked = result.cycles_to_lock.has_value();
   result.samples = true_at_samples_.size();
   result.rejected = discipline_.counters().rejected;
+  result.true_offsets_ns = true_at_samples_;
   if (!true_at_samples_.empty()) result.final_time_error_ns = true_at_samples_.back();
 
   // Not locked: the second half, so that the figure still says where it hangs.

@@ -40,6 +40,7 @@ struct TrialResult {
   double final_time_error_ns = 0.0;
   std::uint64_t samples = 0;
   std::uint64_t rejected = 0;
+  std::vector<double> true_offsets_ns;  ///< at each sample
 };
 
 /// One servo on its own virtual clock, fed with the packets that all trials share, and judged by

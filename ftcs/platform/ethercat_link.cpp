@@ -159,6 +159,13 @@ Result<EthercatLink, OsError> EthercatLink::listen_udp(const std::string& addres
   return link;
 }
 
+std::uint16_t EthercatLink::port() const noexcept {
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  if (raw_ || getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return 0;
+  return ntohs(address.sin_port);
+}
+
 int EthercatLink::send(ethercat::ConstBytes frame) noexcept {
   ethercat::ConstBytes bytes = frame;
   if (raw_) {

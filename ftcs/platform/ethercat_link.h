@@ -25,7 +25,7 @@ class EthercatLink {
   /// The MainDevice's end; the segment listens at `host`:`port`.
   [[nodiscard]] static Result<EthercatLink, OsError> connect_udp(const std::string& host,
                                                                  std::uint16_t port);
-  /// The segment's end: answers whoever sent the last frame.
+  /// The segment's end: answers whoever sent the last frame. Port 0: the system chooses one.
   [[nodiscard]] static Result<EthercatLink, OsError> listen_udp(const std::string& address,
                                                                 std::uint16_t port);
   EthercatLink(EthercatLink&& other) noexcept;
@@ -46,6 +46,8 @@ class EthercatLink {
   /// The kernel's stamp of the frame that was sent last, if it is there by now.
   [[nodiscard]] std::optional<FreeRunningTime> transmit_stamp() noexcept;
 
+  /// The own UDP port; zero on raw Ethernet.
+  [[nodiscard]] std::uint16_t port() const noexcept;
   [[nodiscard]] std::uint64_t foreign() const noexcept { return foreign_; }
   void refresh_clock() noexcept { clock_.refresh(); }
 

@@ -74,4 +74,9 @@ RealtimeSetup make_realtime(int priority, int cpu) noexcept {
   return result;
 }
 
+void leave_realtime() noexcept {
+  const sched_param parameter{.sched_priority = 0};
+  static_cast<void>(sched_setscheduler(0, SCHED_OTHER, &parameter));
+}
+
 }  // namespace ftcs::platform

@@ -40,5 +40,7 @@ struct RealtimeSetup {
 /// sleep states held off as long as the program lives. Nothing is an error: what was refused is
 /// false.
 [[nodiscard]] RealtimeSetup make_realtime(int priority, int cpu) noexcept;
+/// Back to the scheduler of everybody, for the thread that calls it.
+void leave_realtime() noexcept;
 
 }  // namespace ftcs::platform

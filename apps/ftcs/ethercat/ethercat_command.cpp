@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/ethercat/cycle_laws.h"
 #include "apps/ftcs/ethercat/main_runner.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/platform/stop_flag.h"
@@ -43,19 +44,7 @@ Wrong read(const char* flag, const std::string& text, std::int64_t lowest, Nanos
 
 Wrong read_law(EthercatArguments& arguments) {
   CycleServoConfig& servo = arguments.options.servo;
-  if (arguments.servo == "ftcs") servo.law = CycleLaw::kFtcs;
-  if (arguments.servo == "pics") servo.law = CycleLaw::kPics;
-  if (arguments.servo == "adaptive") servo.law = CycleLaw::kAdaptive;
-  if (arguments.servo == "none") servo.law = CycleLaw::kNone;
-  if (arguments.servo == "soem-pi") {
-    // SOEM's published sample: T + 0.01 e + 2e-5 sum(e) every cycle, which in increments is PICS
-    // with an interval of one cycle; it takes the frame's time for the cycle's.
-    servo.law = CycleLaw::kPics;
-    servo.cycles_per_sync = 1;
-    servo.proportional_gain = 0.01;
-    servo.integral_gain = 2e-5;
-    servo.trigger = TriggerModel::kIdeal;
-  }
+  set_cycle_law(arguments.options, arguments.servo);
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
     return "--gains: two numbers, as in 1,1";
@@ -157,7 +146,7 @@ int run_main(EthercatArguments arguments) {
   runner->run(stop);
   if (!options.quiet) print_run(*runner);
   if (!options.json.empty()) {
-    if (const auto error = write_file(options.json, run_json(*runner))) {
+    if (const auto error = write_file(options.json, dump(run_json(*runner)))) {
       fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
       return kRuntimeError;
     }
@@ -180,7 +169,8 @@ void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
 void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
   RunOptions& options = arguments.options;
   command.add_option("--servo", arguments.servo, "ftcs (default), pics, adaptive, soem-pi or none")
-      ->check(CLI::IsMember({"ftcs", "pics", "adaptive", "soem-pi", "none"}));
+      ->check(CLI::IsMember(
+          std::vector<std::string>(cycle_law_names().begin(), cycle_law_names().end())));
   command.add_option("--cycle", arguments.cycle, "default 1ms");
   command.add_option("--sync-interval", arguments.sync_interval,
                      "ftcs and pics act once in this time; default 500ms");

@@ -28,6 +28,8 @@ constexpr Nanoseconds kLineInterval{1'000'000'000};
 constexpr double kRadius = 10'000.0;
 constexpr double kTurn_s = 2.0;
 
+float microseconds(double ns) { return static_cast<float>(ns * 1e-3); }
+
 LocalTime as_local(FreeRunningTime time) { return LocalTime{time.since_epoch()}; }
 
 ethercat::MainDeviceConfig make_config(const RunOptions& options, bool scan_only,
@@ -101,13 +103,24 @@ bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
   return !main_->failure();
 }
 
+/// Before the first cycle: nothing is allocated later.
+void MainRunner::reserve_trace() {
+  constexpr double kMostPoints = 500'000.0;
+  const double cycle_s = static_cast<double>(options_.servo.cycle.count()) * 1e-9;
+  const double cycles = options_.duration_s / cycle_s + 1000.0;
+  const bool bounded = options_.duration_s > 0.0 && cycles < kMostPoints;
+  if (options_.trace)
+    figures_.trace.reserve(static_cast<std::size_t>(bounded ? cycles : kMostPoints));
+}
+
 void MainRunner::run(const std::function<bool()>& stop) {
   axes_.resize(main_->network().count);
-  const FreeRunningTime start = HostClock::now();
-  next_line_ = start + Duration{kLineInterval};
-  decision_ = servo_->start(start);
+  reserve_trace();
+  start_ = HostClock::now();
+  next_line_ = start_ + Duration{kLineInterval};
+  decision_ = servo_->start(start_);
   while (!stop() && main_->stage() == ethercat::Stage::kCyclic) {
-    if (options_.duration_s > 0.0 && (HostClock::now() - start).seconds() > options_.duration_s) {
+    if (options_.duration_s > 0.0 && (HostClock::now() - start_).seconds() > options_.duration_s) {
       break;
     }
     cycle();
@@ -168,6 +181,14 @@ void MainRunner::move_axes() {
   }
 }
 
+/// From the frame's arrival at the reference to the SYNC0 that follows.
+std::int64_t MainRunner::margin_ns(const CycleSample& sample) const {
+  const auto cycle = options_.servo.cycle.count();
+  const auto until_sync0 =
+      static_cast<std::int64_t>(main_->sync0_start()) - sample.reference.since_epoch().rounded_ns();
+  return ((until_sync0 % cycle) + cycle) % cycle;
+}
+
 void MainRunner::note(const CycleSample& sample, bool answered) {
   ++figures_.cycles;
   figures_.host_stalls += decision_.skipped;
@@ -176,26 +197,39 @@ void MainRunner::note(const CycleSample& sample, bool answered) {
   if (locked && figures_.lock_cycle < 0) {
     figures_.lock_cycle = static_cast<std::int64_t>(figures_.cycles);
   }
+  const bool used = decision_.verdict == CycleVerdict::kUsed;
+  if (used) trace(sample);
   if (figures_.lock_cycle < 0) return;
   figures_.lateness.add(decision_.lateness.ns());
   if (decision_.verdict == CycleVerdict::kLate || decision_.verdict == CycleVerdict::kSlow) {
     ++figures_.excluded;
     return;
   }
-  if (decision_.verdict != CycleVerdict::kUsed) return;
+  if (!used) return;
   ++figures_.judged;
   figures_.phase.add(decision_.phase_error.ns());
   figures_.wire_phase.add((decision_.lateness - decision_.phase_error).ns());
   figures_.round_trip.add((sample.received - sample.sent).ns());
-  const auto cycle = options_.servo.cycle.count();
-  const auto until_sync0 =
-      static_cast<std::int64_t>(main_->sync0_start()) - sample.reference.since_epoch().rounded_ns();
-  figures_.margin.add(static_cast<double>(((until_sync0 % cycle) + cycle) % cycle));
-  const auto second = 1'000'000'000 / cycle;
+  figures_.margin.add(static_cast<double>(margin_ns(sample)));
+  const auto second = 1'000'000'000 / options_.servo.cycle.count();
   if (static_cast<std::int64_t>(figures_.cycles) > figures_.lock_cycle + second) {
     figures_.worst_difference_ns =
         std::max(figures_.worst_difference_ns, main_->last_cycle().difference_bound_ns);
   }
+}
+
+/// Before the lock too; and the second half of the run, for a servo that never locks.
+void MainRunner::trace(const CycleSample& sample) {
+  const double time_s = (sample.sent - start_).seconds();
+  const double wire_ns = (decision_.lateness - decision_.phase_error).ns();
+  if (time_s > options_.duration_s / 2) {
+    figures_.second_half_phase.add(decision_.phase_error.ns());
+    figures_.second_half_wire_phase.add(wire_ns);
+  }
+  if (figures_.trace.size() == figures_.trace.capacity()) return;
+  figures_.trace.push_back({static_cast<float>(time_s), microseconds(decision_.phase_error.ns()),
+                            microseconds(wire_ns), microseconds(decision_.lateness.ns()),
+                            microseconds(static_cast<double>(margin_ns(sample)))});
 }
 
 /// OP once the cycle is locked; a SubDevice that left it is acknowledged and asked again.
@@ -219,11 +253,7 @@ void MainRunner::print_live() const {
   fmt::print(
       "margin {:7.1f} us  {:9}  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle {:.6f} ms  "
       "wkc {}/{}  al 0x{:02X}  |0x092C| < {} ns  lost {}  late {}\n",
-      figures_.margin.quantile(0.5) * 1e-3,
-      decision_.state == CycleState::kLocked      ? "locked"
-      : decision_.state == CycleState::kAcquiring ? "acquiring"
-      : decision_.state == CycleState::kCoasting  ? "coasting"
-                                                  : "waiting",
+      figures_.margin.quantile(0.5) * 1e-3, name(decision_.state),
       decision_.phase_error.ns() * 1e-3, decision_.rate.ppm(),
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
       report.expected, report.states, report.difference_bound_ns + 1, main_->counters().lost,
@@ -232,14 +262,11 @@ void MainRunner::print_live() const {
 }
 
 void MainRunner::write_csv(const CycleSample& sample) {
-  const auto cycle = options_.servo.cycle.count();
-  const auto until_sync0 =
-      static_cast<std::int64_t>(main_->sync0_start()) - sample.reference.since_epoch().rounded_ns();
   fmt::print(csv_.get(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{}\n", figures_.cycles,
              static_cast<int>(decision_.state), static_cast<int>(decision_.verdict),
              decision_.phase_error.ns(), decision_.lateness.ns(),
              (sample.received - sample.sent).ns(), decision_.rate.ppb(),
-             main_->last_cycle().working_counter, ((until_sync0 % cycle) + cycle) % cycle);
+             main_->last_cycle().working_counter, margin_ns(sample));
 }
 
 }  // namespace ftcs::app

@@ -13,6 +13,7 @@
 #include "ftcs/ethercat/maindevice/csp_axis.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
 #include "ftcs/platform/ethercat_link.h"
+#include "ftcs/report/json.h"
 
 namespace ftcs::app {
 
@@ -21,6 +22,7 @@ struct RunOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = ethercat::kUdpPort;
   std::size_t drives = 0;  ///< expected at least
+  std::string servo_name = "ftcs";
   CycleServoConfig servo;
   double sync0_phase = 0.5;  ///< SYNC0 comes this part of a cycle after the frame
   std::uint32_t drift_pulses = 15000;
@@ -30,8 +32,19 @@ struct RunOptions {
   int cpu = -1;
   bool move = true;  ///< the axes draw circles, two by two
   bool quiet = false;
+  bool trace = false;  ///< keep a point for each cycle: plots
   std::string json;
   std::string csv;
+  std::string html;
+};
+
+/// One judged cycle. Late is positive in `wire`, early in `phase`.
+struct RunPoint {
+  float time_s = 0.0F;  ///< since the cyclic part began
+  float phase_us = 0.0F;
+  float wire_us = 0.0F;
+  float lateness_us = 0.0F;
+  float margin_us = 0.0F;
 };
 
 /// What a run showed. Times in ns.
@@ -46,9 +59,12 @@ struct RunFigures {
   std::uint32_t worst_difference_ns = 0;  ///< bound of |0x092C|, from one second after the lock on
   QuantileSketch lateness;
   QuantileSketch phase;
-  QuantileSketch wire_phase;  ///< of the frame itself, lateness included
+  QuantileSketch wire_phase;         ///< of the frame itself, lateness included
+  QuantileSketch second_half_phase;  ///< of the run, locked or not
+  QuantileSketch second_half_wire_phase;
   QuantileSketch round_trip;
   QuantileSketch margin;  ///< SYNC0 minus arrival
+  std::vector<RunPoint> trace;
 };
 
 /// Drives a MainDevice and a cycle servo over a link: bring-up, cyclic exchange, motion, report.
@@ -69,13 +85,16 @@ class MainRunner {
 
  private:
   /// One frame there and back; false if none came.
+  void reserve_trace();
   bool exchange(FreeRunningTime deadline, CycleSample* sample);
   void cycle();
   void move_axes();
   void note(const CycleSample& sample, bool answered);
+  void trace(const CycleSample& sample);
   void supervise();
   void print_live() const;
   void write_csv(const CycleSample& sample);
+  [[nodiscard]] std::int64_t margin_ns(const CycleSample& sample) const;
 
   RunOptions options_;
   platform::EthercatLink link_;
@@ -85,16 +104,18 @@ class MainRunner {
   std::vector<ethercat::CspAxis> axes_;
   CycleDecision decision_;
   RunFigures figures_;
+  FreeRunningTime start_;
   FreeRunningTime next_line_;
   std::uint64_t asked_at_ = 0;  ///< cycle in which OP was asked for
   std::uint64_t moving_since_ = 0;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> csv_{nullptr, std::fclose};
 };
 
+[[nodiscard]] const char* name(CycleState state);
 void print_scan(const ethercat::MainDevice& main);
 /// One or two lines for the user: what failed, where, and what was expected.
 [[nodiscard]] std::string describe(const ethercat::Failure& failure);
 void print_run(const MainRunner& runner);
-[[nodiscard]] std::string run_json(const MainRunner& runner);
+[[nodiscard]] Json run_json(const MainRunner& runner);
 
 }  // namespace ftcs::app

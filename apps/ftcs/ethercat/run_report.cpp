@@ -2,27 +2,12 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/ethercat/main_runner.h"
-#include "ftcs/report/json.h"
 
 namespace ftcs::app {
 
 namespace {
 
 using ethercat::FailureKind;
-
-const char* name(CycleLaw law) {
-  switch (law) {
-    case CycleLaw::kNone:
-      return "none";
-    case CycleLaw::kFtcs:
-      return "ftcs";
-    case CycleLaw::kPics:
-      return "pics";
-    case CycleLaw::kAdaptive:
-      return "adaptive";
-  }
-  return "unknown";
-}
 
 double share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -59,6 +44,20 @@ Json drives_json(const MainRunner& runner) {
 }
 
 }  // namespace
+
+const char* name(CycleState state) {
+  switch (state) {
+    case CycleState::kWaiting:
+      return "waiting";
+    case CycleState::kAcquiring:
+      return "acquiring";
+    case CycleState::kLocked:
+      return "locked";
+    case CycleState::kCoasting:
+      return "coasting";
+  }
+  return "unknown";
+}
 
 std::string describe(const ethercat::Failure& failure) {
   std::string text = ethercat::name(failure.kind);
@@ -120,7 +119,7 @@ void print_run(const MainRunner& runner) {
   const CycleServoCounters& servo = runner.servo_counters();
   const ethercat::CycleCounters& counters = runner.main().counters();
   fmt::print("\nservo {}, cycle {} us, {} cycles; locked in cycle {}, OP in cycle {}\n",
-             name(runner.options().servo.law),
+             runner.options().servo_name,
              static_cast<double>(runner.options().servo.cycle.count()) * 1e-3, figures.cycles,
              figures.lock_cycle, figures.op_cycle);
   fmt::print(
@@ -150,12 +149,14 @@ void print_run(const MainRunner& runner) {
   }
 }
 
-std::string run_json(const MainRunner& runner) {
+Json run_json(const MainRunner& runner) {
   const RunFigures& figures = runner.figures();
   const CycleServoCounters& servo = runner.servo_counters();
-  Json json{{"servo", name(runner.options().servo.law)},
+  Json json{{"servo", runner.options().servo_name},
             {"cycle_ns", runner.options().servo.cycle.count()},
             {"cycles", figures.cycles},
+            {"cycles_per_sync", runner.options().servo.cycles_per_sync},
+            {"locked", runner.decision().state == CycleState::kLocked},
             {"lock_cycle", figures.lock_cycle},
             {"op_cycle", figures.op_cycle},
             {"working_counter_right", figures.working_counter_right},
@@ -166,6 +167,8 @@ std::string run_json(const MainRunner& runner) {
             {"excluded_share", share(figures.excluded, figures.judged + figures.excluded)},
             {"virtual_phase", quantiles(figures.phase, true)},
             {"wire_phase", quantiles(figures.wire_phase, true)},
+            {"virtual_phase_second_half", quantiles(figures.second_half_phase, true)},
+            {"wire_phase_second_half", quantiles(figures.second_half_wire_phase, true)},
             {"lateness", quantiles(figures.lateness, false)},
             {"round_trip", quantiles(figures.round_trip, false)},
             {"margin", quantiles(figures.margin, false)},
@@ -177,7 +180,7 @@ std::string run_json(const MainRunner& runner) {
             {"resyncs", servo.resyncs},
             {"drives", drives_json(runner)}};
   if (runner.main().failure()) json["failure"] = describe(runner.main().failure());
-  return dump(json);
+  return json;
 }
 
 }  // namespace ftcs::app

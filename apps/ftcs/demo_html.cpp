@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include "apps/ftcs/demo.h"
+#include "apps/ftcs/demo_ethercat.h"
+#include "apps/ftcs/ethercat/run_html.h"
+#include "ftcs/report/html_report.h"
+
+namespace ftcs::app {
+
+namespace {
+
+Plot offset_plot_of(const DemoResult& result) {
+  Plot plot;
+  plot.title = "PTP: true offset at each Sync message, local minus reference";
+  plot.x_label = "Sync message";
+  plot.y_label = "us";
+  for (const TrialResult& servo : result.servos) {
+    plot.series.push_back(trace_series(servo.servo, servo.true_offsets_ns, 1.0, 1e3));
+  }
+  plot.note = fmt::format("The lock band is ±{}. Zoom in to see more than the first jump.",
+                          format_time(result.lock_band_ns));
+  return plot;
+}
+
+std::string lock_text(const DemoResult& result) {
+  const TrialResult& first = result.servos.front();
+  if (!first.cycles_to_lock) return "not locked";
+  return fmt::format("{} control interval{}", *first.cycles_to_lock,
+                     *first.cycles_to_lock == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::string demo_html(const DemoOptions& options, const DemoResult* result,
+                      const EthercatDemo* ethercat) {
+  HtmlReport report("Frequency-tracking clock servo: demonstration",
+                    "A clock locked over PTP, and the cycle of eight EtherCAT drives");
+  std::vector<LabelledText> figures;
+  if (result != nullptr) {
+    figures.emplace_back(fmt::format("PTP, {}: locked after", result->servos.front().servo),
+                         lock_text(*result));
+  }
+  if (ethercat != nullptr && !ethercat->runs.empty()) {
+    const MainRunner& run = *ethercat->runs.front();
+    const double intervals = static_cast<double>(run.figures().lock_cycle) /
+                             static_cast<double>(run.options().servo.cycles_per_sync);
+    figures.emplace_back(fmt::format("EtherCAT, {}: locked after", run.options().servo_name),
+                         run.figures().lock_cycle < 0
+                             ? "not locked"
+                             : fmt::format("{:.1f} sync intervals", intervals));
+  }
+  report.add_figures("In short", figures);
+  if (result != nullptr) {
+    report.add_table("PTP: all servos on the same packets", demo_table(*result),
+                     demo_method(options, *result));
+    report.add_plot(offset_plot_of(*result));
+  }
+  if (ethercat != nullptr) {
+    add_run_sections(report, ethercat->views());
+    report.add_table("EtherCAT: what the drives saw in the last run",
+                     drives_table(ethercat->segment->server()));
+  }
+  report.add_parameters({{"version", FTCS_VERSION},
+                         {"duration of the PTP part", fmt::format("{:g} s", options.duration_s)},
+                         {"traffic", "loopback, this machine"}});
+  return report.render();
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/ethercat/run_html.h"
+
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "apps/ftcs/live_view.h"
+#include "ftcs/analysis/statistics.h"
+
+namespace ftcs::app {
+
+namespace {
+
+constexpr std::size_t kBins = 80;
+/// Histograms show what lies inside these quantiles: one stall would squeeze the rest into one bin.
+constexpr double kShownQuantile = 0.999;
+
+PlotSeries over_time(const MainRunner& run, float RunPoint::*field) {
+  PlotSeries series;
+  series.name = run.options().servo_name;
+  for (const RunPoint& point : run.figures().trace) {
+    series.x.push_back(point.time_s);
+    series.y.push_back(point.*field);
+  }
+  return series;
+}
+
+Plot time_plot(std::span<const MainRunner* const> runs, const char* title, const char* label,
+               float RunPoint::*field) {
+  Plot plot;
+  plot.title = title;
+  plot.x_label = "s";
+  plot.y_label = label;
+  for (const MainRunner* run : runs) plot.series.push_back(over_time(*run, field));
+  return plot;
+}
+
+Plot histogram_plot(const MainRunner& run, const char* title, const QuantileSketch& sketch,
+                    float RunPoint::*field) {
+  Plot plot;
+  plot.title = fmt::format("{}, {}", title, run.options().servo_name);
+  plot.x_label = "us";
+  plot.y_label = "cycles";
+  plot.style = PlotStyle::kFilledSteps;
+  const double lower = sketch.quantile(1.0 - kShownQuantile) * 1e-3;
+  const double upper = sketch.quantile(kShownQuantile) * 1e-3;
+  std::vector<double> values;
+  for (const RunPoint& point : run.figures().trace) values.push_back(point.*field);
+  if (!(lower < upper)) return plot;
+  const Histogram bins = histogram(values, lower, upper, kBins);
+  plot.series.push_back(histogram_series("cycles", bins, 1.0));
+  plot.note = fmt::format("{} cycles lie outside.", bins.below + bins.above);
+  return plot;
+}
+
+std::string pair_of(const QuantileSketch& sketch) {
+  if (sketch.count() == 0) return "-";
+  return format_time(sketch.absolute_quantile(0.5)) + " / " +
+         format_time(sketch.absolute_quantile(0.99));
+}
+
+}  // namespace
+
+Table runs_table(std::span<const MainRunner* const> runs) {
+  Table table({"servo", "locked", "cycles to lock", "sync intervals", "virtual phase p50 / p99",
+               "frame itself p50 / p99", "working counter right", "lost", "stalls", "excluded",
+               "|0x092C|"});
+  for (const MainRunner* run : runs) {
+    const RunFigures& figures = run->figures();
+    const bool locked = figures.lock_cycle >= 0;
+    const double intervals = static_cast<double>(figures.lock_cycle) /
+                             static_cast<double>(run->options().servo.cycles_per_sync);
+    const std::uint64_t all = figures.judged + figures.excluded;
+    const double excluded =
+        all == 0 ? 0.0 : static_cast<double>(figures.excluded) / static_cast<double>(all);
+    const bool every_cycle = run->options().servo.law == CycleLaw::kAdaptive ||
+                             run->options().servo.cycles_per_sync == 1;
+    table.add_row(
+        {run->options().servo_name, run->decision().state == CycleState::kLocked ? "yes" : "no",
+         locked ? Cell::count(static_cast<unsigned long long>(figures.lock_cycle)) : Cell{"-"},
+         locked && !every_cycle ? Cell::fixed(intervals, 1) : Cell{"-"},
+         pair_of(locked ? figures.phase : figures.second_half_phase),
+         pair_of(locked ? figures.wire_phase : figures.second_half_wire_phase),
+         fmt::format("{} of {}", figures.working_counter_right, figures.cycles),
+         Cell::count(run->main().counters().lost), Cell::count(figures.host_stalls),
+         fmt::format("{:.2f} %", 100.0 * excluded),
+         locked ? fmt::format("< {} ns", figures.worst_difference_ns + 1) : "-"});
+  }
+  return table;
+}
+
+void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> runs) {
+  report.add_table(
+      "EtherCAT: the cycle and its reference", runs_table(runs),
+      "Virtual phase: the cycle as scheduled against SYNC0's grid, the sender's lateness (which it "
+      "knows) taken off. Frame itself: lateness included. From the lock on (never locked: the "
+      "second "
+      "half). Cycles later or slower than the gate are "
+      "left out; their share is \"excluded\". |0x092C| from one second after the lock.");
+  report.add_plot(
+      time_plot(runs, "Phase error of the cycle, early is positive", "us", &RunPoint::phase_us));
+  if (runs.empty()) return;
+  const MainRunner& first = *runs.front();
+  report.add_plot(histogram_plot(first, "Margin from the frame to SYNC0", first.figures().margin,
+                                 &RunPoint::margin_us));
+  report.add_plot(histogram_plot(first, "Lateness of the wake-up", first.figures().lateness,
+                                 &RunPoint::lateness_us));
+  report.add_plot(histogram_plot(first, "Phase error of the cycle", first.figures().phase,
+                                 &RunPoint::phase_us));
+}
+
+Table drives_table(const SegmentServer& server) {
+  Table table({"drive", "state", "AL status", "|0x092C| / ns", "SYNC0 events", "missed",
+               "smallest margin / us", "largest margin / us"});
+  const ethercat::Segment& segment = server.segment();
+  for (std::size_t n = 0; n < segment.size(); ++n) {
+    const ethercat::SubDevice& device = segment[n];
+    const ethercat::SyncStatistics& sync = device.drive().statistics();
+    const bool judged = sync.events > sync.missed;
+    constexpr double kMicro = 1e-3;
+    table.add_row(
+        {Cell::count(n), ethercat::name(device.drive().state()),
+         ethercat::name(device.drive().code()),
+         Cell::count(static_cast<unsigned long long>(std::abs(device.system_time_difference()))),
+         Cell::count(sync.events), Cell::count(sync.missed),
+         judged ? Cell::fixed(static_cast<double>(sync.smallest_margin_ns) * kMicro, 1) : Cell{"-"},
+         judged ? Cell::fixed(static_cast<double>(sync.largest_margin_ns) * kMicro, 1)
+                : Cell{"-"}});
+  }
+  return table;
+}
+
+}  // namespace ftcs::app
