@@ -35,6 +35,7 @@ class SegmentRing {
   [[nodiscard]] const Segment& newest(std::size_t age) const noexcept {
     return segments_[(oldest_ + size_ - 1 - age) % Capacity];
   }
+  [[nodiscard]] Segment& newest() noexcept { return segments_[(oldest_ + size_ - 1) % Capacity]; }
   /// The segment that holds at an instant.
   [[nodiscard]] const Segment& at(FreeRunningTime instant) const noexcept {
     std::size_t age = 0;

@@ -31,6 +31,13 @@ class SteeringHistory {
     segments_.append(Segment{segments_.at(instant).map.continued(instant, rate).stepped(step)});
   }
 
+  /// What was measured says that the segment now in force lies elsewhere (a kernel's clock is known
+  /// from readings, not from commands): moves that segment alone.
+  void shift_newest(Duration by) noexcept {
+    Segment& newest = segments_.newest();
+    newest.map = newest.map.stepped(by);
+  }
+
   /// Exact within the history; before it, the oldest segment is extended backward.
   [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept {
     return segments_.at(instant).map(instant);

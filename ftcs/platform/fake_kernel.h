@@ -22,7 +22,7 @@ namespace ftcs::platform {
 
 /// A kernel for tests: two clocks, one interface "eth0", datagram sockets with receive and error
 /// queues, and a switch for every way in which they are known to fail.
-class FakeKernel final : public Kernel {
+class FakeKernel : public Kernel {
  public:
   struct Packet {
     std::vector<std::uint8_t> bytes;
@@ -176,6 +176,12 @@ class FakeKernel final : public Kernel {
     return ready;
   }
   void close(int fd) noexcept override { sockets.erase(fd); }
+  // Clocks are steered in fake_clocks.h.
+  ssize_t read(int, std::span<std::uint8_t>) noexcept override { return -EBADF; }
+  int adjust_clock(clockid_t, timex&) noexcept override { return -EINVAL; }
+  int open_timer() noexcept override { return next_descriptor_++; }
+  int set_timer(int, std::int64_t) noexcept override { return 0; }
+  int hold_name(const char*) noexcept override { return next_descriptor_++; }
 
  private:
   static void write_stamps(const Packet& packet, msghdr& message) {

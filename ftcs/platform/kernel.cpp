@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/kernel.h"
 
+#include <algorithm>
 #include <cerrno>
+#include <cstddef>
+#include <cstring>
 #include <fcntl.h>
 #include <sys/ioctl.h>
+#include <sys/timerfd.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 namespace ftcs::platform {
@@ -65,6 +70,40 @@ int LinuxKernel::poll(std::span<pollfd> descriptors, int timeout_ms) noexcept {
 }
 
 void LinuxKernel::close(int fd) noexcept { ::close(fd); }
+
+ssize_t LinuxKernel::read(int fd, std::span<std::uint8_t> bytes) noexcept {
+  return or_errno(::read(fd, bytes.data(), bytes.size()));
+}
+
+int LinuxKernel::adjust_clock(clockid_t clock, timex& request) noexcept {
+  return or_errno(::clock_adjtime(clock, &request));
+}
+
+int LinuxKernel::open_timer() noexcept {
+  return or_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK));
+}
+
+int LinuxKernel::set_timer(int fd, std::int64_t from_now_ns) noexcept {
+  const std::int64_t ns = std::max<std::int64_t>(from_now_ns, 1);  // zero would disarm it
+  itimerspec when{};
+  when.it_value = {.tv_sec = ns / kNanosecondsPerSecond, .tv_nsec = ns % kNanosecondsPerSecond};
+  return or_errno(::timerfd_settime(fd, 0, &when, nullptr));
+}
+
+// An abstract UNIX address: nothing stays behind in a file system.
+int LinuxKernel::hold_name(const char* name) noexcept {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::size_t length = std::min(std::strlen(name), sizeof address.sun_path - 1);
+  std::memcpy(address.sun_path + 1, name, length);
+  const int fd = socket(AF_UNIX, SOCK_DGRAM);
+  if (fd < 0) return fd;
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
+  const int bound = or_errno(::bind(fd, reinterpret_cast<const sockaddr*>(&address), size));
+  if (bound >= 0) return fd;
+  close(fd);
+  return bound;
+}
 
 Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
   if (this != &other) {

@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <span>
 #include <sys/socket.h>
+#include <sys/timex.h>
 #include <sys/types.h>
 
 namespace ftcs::platform {
@@ -34,6 +35,16 @@ class Kernel {
   [[nodiscard]] virtual int open(const char* path, int flags) noexcept = 0;
   [[nodiscard]] virtual int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept = 0;
   virtual void close(int fd) noexcept = 0;
+  [[nodiscard]] virtual ssize_t read(int fd, std::span<std::uint8_t> bytes) noexcept = 0;
+  /// clock_adjtime(2): with modes 0 only asks. Fills `request` with what the kernel then holds;
+  /// returns the clock's leap state.
+  [[nodiscard]] virtual int adjust_clock(clockid_t clock, timex& request) noexcept = 0;
+  /// A descriptor that becomes readable when the time of set_timer() has passed on CLOCK_MONOTONIC.
+  [[nodiscard]] virtual int open_timer() noexcept = 0;
+  [[nodiscard]] virtual int set_timer(int fd, std::int64_t from_now_ns) noexcept = 0;
+  /// A name that one process of this host (network namespace) can hold, until the descriptor is
+  /// closed or the process ends. -EADDRINUSE: somebody does.
+  [[nodiscard]] virtual int hold_name(const char* name) noexcept = 0;
 
  protected:
   Kernel() = default;
@@ -57,6 +68,11 @@ class LinuxKernel final : public Kernel {
   [[nodiscard]] int open(const char* path, int flags) noexcept override;
   [[nodiscard]] int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override;
   void close(int fd) noexcept override;
+  [[nodiscard]] ssize_t read(int fd, std::span<std::uint8_t> bytes) noexcept override;
+  [[nodiscard]] int adjust_clock(clockid_t clock, timex& request) noexcept override;
+  [[nodiscard]] int open_timer() noexcept override;
+  [[nodiscard]] int set_timer(int fd, std::int64_t from_now_ns) noexcept override;
+  [[nodiscard]] int hold_name(const char* name) noexcept override;
 };
 
 /// Owns a file descriptor.

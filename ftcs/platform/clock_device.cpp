@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/clock_device.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <fcntl.h>
+#include <limits>
+#include <linux/ptp_clock.h>
+#include <utility>
+
+#include "ftcs/platform/network_interface.h"
+
+namespace ftcs::platform {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr double kScaledPerPpm = 65536.0;  // timex.freq counts in 2^-16 ppm
+// Of timex.tick: microseconds per 1/100 s (USER_HZ) on every architecture that has PTP hardware.
+constexpr long kNominalTick = 10'000;
+constexpr double kPpmPerTick = 100.0;
+constexpr double kLargestFrequencyPpm = 500.0;   // the kernel's MAXFREQ
+constexpr double kLargestSystemPpm = 100'000.0;  // the kernel permits ±10 % of the tick
+
+// The kernel's rule for the id of a clock behind a file descriptor (man 2 clock_getres, dynamic
+// clocks).
+clockid_t clock_id_of(int fd) noexcept {
+  constexpr unsigned kClockFd = 3;
+  return static_cast<clockid_t>((~static_cast<unsigned>(fd) << 3) | kClockFd);
+}
+
+ClockError clock_error(int number) noexcept {
+  switch (number) {
+    case EPERM:
+    case EACCES:
+      return ClockError::kNotPermitted;
+    case ENODEV:
+    case ENXIO:
+    case ENOENT:
+      return ClockError::kGone;
+    case ERANGE:
+    case EINVAL:
+      return ClockError::kRateOutOfLimits;
+    default:
+      return ClockError::kBusy;  // EBUSY, and whatever a driver refuses for now
+  }
+}
+
+OsError device_error(int number, const std::string& name) {
+  OsError error = os_error(number, name);
+  if (number == ENOENT || number == ENODEV || number == ENXIO) {
+    error.kind = OsErrorKind::kNoSuchDevice;
+  }
+  return error;
+}
+
+struct Frequency {
+  long tick = kNominalTick;
+  long freq = 0;
+  [[nodiscard]] Rate rate() const noexcept {
+    const double ticks = static_cast<double>(tick - kNominalTick) * kPpmPerTick;
+    return Rate::from_ppm(ticks + static_cast<double>(freq) / kScaledPerPpm);
+  }
+};
+
+Frequency system_frequency(Rate rate) noexcept {
+  Frequency result;
+  double ppm = rate.ppm();
+  if (std::abs(ppm) > kLargestFrequencyPpm) {
+    const double ticks = std::round(ppm / kPpmPerTick);
+    result.tick += static_cast<long>(ticks);
+    ppm -= ticks * kPpmPerTick;
+  }
+  result.freq = std::lround(ppm * kScaledPerPpm);
+  return result;
+}
+
+}  // namespace
+
+Result<ClockDevice, OsError> ClockDevice::open_system(Kernel& kernel, ClockAccess access) {
+  ClockDevice device(kernel, "CLOCK_REALTIME", CLOCK_REALTIME);
+  device.limits_ = RateLimits::symmetric_ppb(kLargestSystemPpm * 1e3);
+  if (access == ClockAccess::kSteer) {
+    if (auto error = device.probe_rights()) return std::move(*error);
+    if (auto error = device.hold("ftcs clock realtime")) return std::move(*error);
+  }
+  return device;
+}
+
+Result<ClockDevice, OsError> ClockDevice::open_phc(Kernel& kernel, const std::string& path,
+                                                   ClockAccess access) {
+  const int fd = kernel.open(path.c_str(), access == ClockAccess::kSteer ? O_RDWR : O_RDONLY);
+  if (fd < 0) return device_error(-fd, path);
+  ClockDevice device(kernel, path, clock_id_of(fd));
+  device.device_ = Descriptor(kernel, fd);
+  ptp_clock_caps capabilities{};
+  if (const int result = kernel.control(fd, PTP_CLOCK_GETCAPS, &capabilities); result < 0) {
+    OsError error = device_error(-result, path);
+    if (result == -ENOTTY || result == -EINVAL) {
+      error.what += ": not a PTP hardware clock";
+      error.kind = OsErrorKind::kSystem;
+    }
+    return error;
+  }
+  // Rounding must not lead beyond what the driver takes, and a rate stays above zero.
+  const double largest_ppb = std::min(static_cast<double>(capabilities.max_adj), 999'000'000.0);
+  device.limits_ = RateLimits::symmetric_ppb(std::max(largest_ppb, 0.0));
+  if (access == ClockAccess::kSteer) {
+    if (capabilities.max_adj <= 0) {
+      return OsError{OsErrorKind::kSystem, EOPNOTSUPP, path + " (its frequency is fixed)"};
+    }
+    if (auto error = device.hold("ftcs clock " + path.substr(path.rfind('/') + 1))) {
+      return std::move(*error);
+    }
+  }
+  return device;
+}
+
+Result<ClockDevice, OsError> ClockDevice::open_phc_of(Kernel& kernel, const std::string& interface,
+                                                      ClockAccess access) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return os_error(-fd, "socket");
+  const Descriptor socket(kernel, fd);
+  const auto state = interface_state(kernel, fd, interface);
+  if (!state) return state.error();
+  const auto capabilities = interface_capabilities(kernel, fd, interface);
+  if (!capabilities) return capabilities.error();
+  if (capabilities->phc_index < 0) {
+    return OsError{OsErrorKind::kTimestampingUnsupported, 0,
+                   "interface " + interface + ": no PTP hardware clock"};
+  }
+  return open_phc(kernel, "/dev/ptp" + std::to_string(capabilities->phc_index), access);
+}
+
+// Two servos on one clock would fight. Where names cannot be held (a simulator without UNIX
+// sockets) the check is left out.
+std::optional<OsError> ClockDevice::hold(const std::string& key) {
+  const int fd = kernel_->hold_name(key.c_str());
+  if (fd == -EADDRINUSE) return os_error(EADDRINUSE, name_);
+  if (fd >= 0) hold_ = Descriptor(*kernel_, fd);
+  return std::nullopt;
+}
+
+// A tick of zero is refused whatever the clock; whether as EPERM or as EINVAL tells the rights, and
+// nothing has changed either way.
+std::optional<OsError> ClockDevice::probe_rights() {
+  timex request{};
+  request.modes = ADJ_TICK;
+  const int result = kernel_->adjust_clock(id_, request);
+  if (result == -EPERM || result == -EACCES) return os_error(-result, "steering " + name_);
+  return std::nullopt;
+}
+
+std::optional<ClockError> ClockDevice::failed(int result) noexcept {
+  if (result >= 0) return std::nullopt;
+  error_number_ = -result;
+  return clock_error(-result);
+}
+
+std::optional<std::int64_t> ClockDevice::read_clock() noexcept {
+  const std::int64_t now = kernel_->clock_ns(id_);
+  if (now == 0) {
+    error_number_ = ENODEV;
+    return std::nullopt;
+  }
+  return now;
+}
+
+// Interrupts disturb single brackets; a hardware clock takes a microsecond to read, so that one
+// bracket must do.
+Result<ClockDevice::Reading, ClockError> ClockDevice::read() noexcept {
+  const int readings = is_system() ? 5 : 1;
+  Reading best{0, 0, std::numeric_limits<std::int64_t>::max()};
+  for (int i = 0; i < readings; ++i) {
+    const std::int64_t before = kernel_->clock_ns(CLOCK_MONOTONIC_RAW);
+    const auto clock = read_clock();
+    const std::int64_t after = kernel_->clock_ns(CLOCK_MONOTONIC_RAW);
+    if (!clock) return ClockError::kGone;
+    if (after - before < best.width_ns) {
+      best = {*clock, before + (after - before) / 2, after - before};
+    }
+  }
+  return best;
+}
+
+Result<Rate, ClockError> ClockDevice::rate() noexcept {
+  timex request{};
+  if (const auto error = failed(kernel_->adjust_clock(id_, request))) return *error;
+  return Frequency{is_system() ? request.tick : kNominalTick, request.freq}.rate();
+}
+
+Result<Rate, ClockError> ClockDevice::set_rate(Rate rate) noexcept {
+  if (!limits_.contains(rate)) return ClockError::kRateOutOfLimits;
+  Frequency wanted;
+  timex request{};
+  request.modes = ADJ_FREQUENCY;
+  if (is_system()) {
+    wanted = system_frequency(rate);
+    request.modes |= ADJ_TICK;
+    request.tick = wanted.tick;
+  } else {
+    wanted.freq = static_cast<long>(rate.ppm() * kScaledPerPpm);  // towards zero: within the limits
+  }
+  request.freq = wanted.freq;
+  if (const auto error = failed(kernel_->adjust_clock(id_, request))) return *error;
+  return wanted.rate();
+}
+
+std::optional<ClockError> ClockDevice::step(Duration by) noexcept {
+  const std::int64_t ns = by.rounded_ns();
+  timex request{};
+  request.modes = ADJ_SETOFFSET | ADJ_NANO;
+  request.time.tv_sec = ns / kNsPerSecond;
+  request.time.tv_usec = ns % kNsPerSecond;  // nanoseconds, by ADJ_NANO
+  if (request.time.tv_usec < 0) {
+    request.time.tv_usec += kNsPerSecond;
+    --request.time.tv_sec;
+  }
+  return failed(kernel_->adjust_clock(id_, request));
+}
+
+}  // namespace ftcs::platform

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <linux/ptp_clock.h>
+#include <set>
+#include <string>
+
+#include "ftcs/platform/fake_kernel.h"
+
+namespace ftcs::platform {
+
+/// FakeKernel with clocks that can be steered: CLOCK_REALTIME on the oscillator of
+/// CLOCK_MONOTONIC_RAW, and /dev/ptp0 on one of its own. Rates, steps and leaps are those of a
+/// kernel with infinitely short ticks; `ideal` time is what advance() counts.
+class FakeClocks final : public FakeKernel {
+ public:
+  struct Clock {
+    double time_ns = 0.0;
+    double oscillator = 1.0;  ///< unsteered rate against ideal time
+    long tick = 10'000;
+    long freq = 0;
+    int status = STA_UNSYNC;
+    int tai = 0;
+    long maxerror = 0;
+    long esterror = 0;
+    [[nodiscard]] double steering() const {
+      return 1.0 + static_cast<double>(tick - 10'000) * 1e-4 +
+             static_cast<double>(freq) / 65536.0 * 1e-6;
+    }
+    void advance(double ns) { time_ns += ns * oscillator * steering(); }
+  };
+
+  // Relative to an epoch, so that a double resolves them.
+  static constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
+  Clock system;
+  Clock phc;
+  double raw = 1e12;
+  double ideal_ns = 0.0;
+  std::int64_t max_adj_ppb = 50'000'000;
+  std::int64_t phc_reading_ns = 800;  ///< what it takes to read the hardware clock over the bus
+
+  // Failures.
+  int adjust_errno = 0;  ///< of commands; questions are answered
+  int phc_open_errno = 0;
+  int precise_errno = EOPNOTSUPP;
+  int extended_errno = 0;
+  int basic_errno = 0;
+  bool phc_gone = false;
+  bool short_cross_reads = false;
+  std::set<std::string> held_names;
+  int commands = 0;  ///< adjust_clock() calls that asked for a change and got it
+  std::int64_t timer_ns = 0;
+
+  FakeClocks() { reading_ns = 20; }
+
+  void run(double ns) {
+    ideal_ns += ns;
+    raw += ns * system.oscillator;
+    system.advance(ns);
+    phc.advance(ns);
+  }
+  [[nodiscard]] static double relative(std::int64_t clock_ns) {
+    return static_cast<double>(clock_ns - kEpoch);
+  }
+
+  std::int64_t clock_ns(clockid_t clock) noexcept override {
+    run(static_cast<double>(reading_ns));
+    if (on_clock_read) on_clock_read();
+    if (clock == CLOCK_REALTIME) return kEpoch + std::llround(system.time_ns);
+    if (clock == CLOCK_MONOTONIC_RAW || clock == CLOCK_MONOTONIC) return std::llround(raw);
+    if (phc_gone) return 0;
+    run(static_cast<double>(phc_reading_ns) / 2);
+    const std::int64_t now = kEpoch + std::llround(phc.time_ns);
+    run(static_cast<double>(phc_reading_ns) / 2);
+    return now;
+  }
+  int open(const char* path, int) noexcept override {
+    if (std::string(path) != "/dev/ptp0") return -ENOENT;
+    return phc_open_errno != 0 ? -phc_open_errno : kPhcDescriptor;
+  }
+  int hold_name(const char* name) noexcept override {
+    return held_names.insert(name).second ? 900 : -EADDRINUSE;
+  }
+  int set_timer(int, std::int64_t ns) noexcept override {
+    timer_ns = ns;
+    return 0;
+  }
+  int adjust_clock(clockid_t id, timex& request) noexcept override {
+    Clock& clock = id == CLOCK_REALTIME ? system : phc;
+    if (&clock == &phc && phc_gone) return -ENODEV;
+    if (request.modes != 0) {
+      if (adjust_errno != 0) return -adjust_errno;
+      if (const int error = change(clock, request); error != 0) return -error;
+      ++commands;
+    }
+    request.freq = clock.freq;
+    request.tick = &clock == &system ? clock.tick : 0;
+    request.status = clock.status;
+    request.tai = clock.tai;
+    return TIME_OK;
+  }
+  int control(int fd, unsigned long request, void* argument) noexcept override {
+    if (fd != kPhcDescriptor) return FakeKernel::control(fd, request, argument);
+    if (phc_gone) return -ENODEV;
+    switch (request) {
+      case PTP_CLOCK_GETCAPS:
+        static_cast<ptp_clock_caps*>(argument)->max_adj = static_cast<int>(max_adj_ppb);
+        return 0;
+      case PTP_SYS_OFFSET_PRECISE:
+        return precise_errno != 0 ? -precise_errno : precise(argument);
+      case PTP_SYS_OFFSET_EXTENDED:
+        return extended_errno != 0 ? -extended_errno : extended(argument);
+      case PTP_SYS_OFFSET:
+        return basic_errno != 0 ? -basic_errno : basic(argument);
+      default:
+        return -ENOTTY;
+    }
+  }
+
+  static constexpr int kPhcDescriptor = 800;
+
+ private:
+  static ptp_clock_time time_of(const Clock& clock) {
+    const std::int64_t now = kEpoch + std::llround(clock.time_ns);
+    ptp_clock_time time{};
+    time.sec = now / 1'000'000'000;
+    time.nsec = static_cast<std::uint32_t>(now % 1'000'000'000);
+    return time;
+  }
+  ptp_clock_time read_over_bus() {
+    run(static_cast<double>(phc_reading_ns) / 2);
+    const ptp_clock_time time = time_of(phc);
+    run(static_cast<double>(phc_reading_ns) / 2);
+    if (on_clock_read) on_clock_read();
+    return time;
+  }
+  int precise(void* argument) {
+    auto* answer = static_cast<ptp_sys_offset_precise*>(argument);
+    if (short_cross_reads) return 0;
+    answer->device = time_of(phc);
+    answer->sys_realtime = time_of(system);
+    return 0;
+  }
+  int extended(void* argument) {
+    auto* answer = static_cast<ptp_sys_offset_extended*>(argument);
+    if (short_cross_reads) answer->n_samples = 0;
+    for (unsigned i = 0; i < answer->n_samples; ++i) {
+      answer->ts[i][0] = time_of(system);
+      answer->ts[i][1] = read_over_bus();
+      answer->ts[i][2] = time_of(system);
+    }
+    return 0;
+  }
+  int basic(void* argument) {
+    auto* answer = static_cast<ptp_sys_offset*>(argument);
+    if (short_cross_reads) answer->n_samples = 0;
+    for (unsigned i = 0; i < answer->n_samples; ++i) {
+      answer->ts[2 * i] = time_of(system);
+      answer->ts[2 * i + 1] = read_over_bus();
+    }
+    answer->ts[2 * answer->n_samples] = time_of(system);
+    return 0;
+  }
+  int change(Clock& clock, const timex& request) {
+    const bool is_system = &clock == &system;
+    if ((request.modes & ADJ_TICK) != 0) {
+      if (!is_system || request.tick < 9'000 || request.tick > 11'000) return EINVAL;
+      clock.tick = request.tick;
+    }
+    if ((request.modes & ADJ_FREQUENCY) != 0) {
+      const double ppb = static_cast<double>(request.freq) / 65.536;
+      if (is_system && std::abs(ppb) > 500'000.0) return EINVAL;
+      if (!is_system && std::abs(ppb) > static_cast<double>(max_adj_ppb)) return ERANGE;
+      clock.freq = request.freq;
+    }
+    if ((request.modes & ADJ_SETOFFSET) != 0) {
+      clock.time_ns += static_cast<double>(request.time.tv_sec) * 1e9 +
+                       static_cast<double>(request.time.tv_usec);
+    }
+    if ((request.modes & ADJ_STATUS) != 0) clock.status = request.status;
+    if ((request.modes & ADJ_TAI) != 0) clock.tai = static_cast<int>(request.constant);
+    if ((request.modes & ADJ_MAXERROR) != 0) clock.maxerror = request.maxerror;
+    if ((request.modes & ADJ_ESTERROR) != 0) clock.esterror = request.esterror;
+    return 0;
+  }
+};
+
+}  // namespace ftcs::platform

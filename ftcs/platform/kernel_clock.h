@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/clock/steering_history.h"
+#include "ftcs/platform/clock_device.h"
+
+namespace ftcs::platform {
+
+/// What others did to a clock that we steer, since the last time somebody asked.
+struct ForeignSteering {
+  std::optional<Rate> expected_rate{};  ///< another program changed the frequency: what we had set
+  std::optional<Rate> found_rate{};     ///< and what the kernel held instead
+  std::optional<Duration> step{};       ///< the clock was set: by how much it leapt
+  int leap = 0;  ///< +1: the kernel inserted the announced leap second, -1: it left one out
+};
+
+/// A clock of the kernel as an AdjustableClock.
+///
+/// The kernel shows the steered face only. The free-running face of CLOCK_REALTIME is
+/// CLOCK_MONOTONIC_RAW, the same oscillator; that of a PTP hardware clock is rebuilt by taking the
+/// commands back (SteeringHistory), each placed between two readings. A kernel keeps no expiry, so
+/// that a correction is ended by whoever runs the loop: wake at expiry() (wait_for_expiry_ns()) and
+/// call read(), which ends what is due. Lateness is accounted for, not assumed away: the history
+/// holds the moment at which the rate changed.
+///
+/// The clock is not touched before the first apply(). One thread.
+class KernelClock final : public AdjustableClock, public FreeRunningSource {
+ public:
+  /// `limits`: narrowed by the device's own. `may_steer` false: apply() is refused, always.
+  explicit KernelClock(ClockDevice device, const RateLimits& limits = {}, bool may_steer = true);
+
+  [[nodiscard]] ClockReading read() noexcept override;
+  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept override {
+    return history_.local_at(instant);
+  }
+  [[nodiscard]] RateLimits rate_limits() const noexcept override { return limits_; }
+  [[nodiscard]] Result<ClockReading, ClockError> apply(
+      const ServoCommand& command) noexcept override;
+  [[nodiscard]] FreeRunningTime now() noexcept override { return read().free_running; }
+
+  /// A timestamp that was taken from this clock, on its free-running face. No value: it is older
+  /// than a step that somebody else made, or from the future.
+  [[nodiscard]] std::optional<FreeRunningTime> from_stamp(std::int64_t clock_ns) noexcept;
+
+  /// When the running correction has to end; no value: none runs.
+  [[nodiscard]] std::optional<FreeRunningTime> expiry() const noexcept { return end_; }
+  /// How long to sleep on CLOCK_MONOTONIC, which may be steered along with this clock: never too
+  /// long, so that a second, shorter sleep may be needed.
+  [[nodiscard]] std::optional<std::int64_t> wait_for_expiry_ns() noexcept;
+  /// Ends a correction at once; the clock keeps the tracking rate. To be called before the program
+  /// ends.
+  void settle() noexcept;
+
+  /// What local time is ahead of the clock's own reading by: TAI - UTC for CLOCK_REALTIME that
+  /// follows a TAI reference. A change moves local time.
+  void set_timescale_offset(Duration ahead) noexcept;
+  [[nodiscard]] Duration timescale_offset() const noexcept { return timescale_offset_; }
+  /// A leap second at the end of the day: +1 the kernel will insert one, -1 leave one out, 0 none.
+  /// When the clock then leaps, local time goes on.
+  void expect_leap(int leap) noexcept { expected_leap_ = leap; }
+  /// Makes the leap itself, where the kernel is not asked to. Local time goes on.
+  [[nodiscard]] std::optional<ClockError> leap_now(int leap) noexcept;
+
+  /// Asks the kernel whether its frequency is still ours, and reports that and everything else
+  /// once.
+  [[nodiscard]] ForeignSteering take_foreign_steering() noexcept;
+  /// Set for good once the device is gone.
+  [[nodiscard]] std::optional<ClockError> failure() const noexcept { return failure_; }
+  [[nodiscard]] ClockDevice& device() noexcept { return device_; }
+  [[nodiscard]] const ClockDevice& device() const noexcept { return device_; }
+
+ private:
+  struct Faces {
+    ClockReading reading;
+    std::int64_t raw_ns = 0;
+  };
+
+  [[nodiscard]] std::optional<Faces> look() noexcept;
+  void learn_gain(Duration deviation, std::int64_t elapsed_raw_ns) noexcept;
+  void note_leap_or_step(Duration deviation, const ClockDevice::Reading& now,
+                         FreeRunningTime instant) noexcept;
+  void check_rate() noexcept;
+  [[nodiscard]] std::optional<ClockError> change_rate(Rate rate, Duration step) noexcept;
+  void end_correction() noexcept;
+  [[nodiscard]] LocalTime local_of(std::int64_t clock_ns) const noexcept {
+    return LocalTime{Duration::from_whole_ns(clock_ns) + timescale_offset_};
+  }
+
+  ClockDevice device_;
+  RateLimits limits_;
+  bool may_steer_;
+  Duration timescale_offset_{};
+  SteeringHistory history_;
+  Rate held_rate_{};  // what the kernel should hold
+  bool has_steered_ = false;
+  ClockReading latest_{};  // of the last look at the device
+  std::int64_t latest_raw_ns_ = 0;
+  std::int64_t trusted_since_ns_;         // older stamps belong to before somebody's step
+  std::optional<FreeRunningTime> end_{};  // of the running correction
+  Rate tracking_rate_{};
+  // CLOCK_REALTIME against RAW differs from the commanded rate by the rounding of the kernel's
+  // multipliers; measured over at least a second at a time.
+  double gain_ = 1.0;
+  Duration gain_deviation_{};
+  std::int64_t gain_elapsed_ns_ = 0;
+  int expected_leap_ = 0;
+  ForeignSteering foreign_{};
+  std::optional<ClockError> failure_{};
+};
+
+}  // namespace ftcs::platform
