@@ -64,7 +64,8 @@ int reproduce(const PaperOptions& options) {
   fmt::print("{}\n",
              passed ? "Every demanded tolerance holds." : "A demanded tolerance does not hold.");
   bool written =
-      options.json.empty() || write_result(options.json, dump(paper_json(results, FTCS_VERSION)));
+      options.json.empty() ||
+      write_result(options.json, dump(paper_json(results, FTCS_VERSION, !interrupt.flag())));
   written &= options.csv.empty() || write_result(options.csv, paper_csv(results).to_csv());
   written &= options.html.empty() || write_result(options.html, paper_html(results, FTCS_VERSION));
   return written && passed ? kSuccess : kRuntimeError;

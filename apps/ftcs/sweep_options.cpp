@@ -83,7 +83,6 @@ void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
     for (const auto& note : scenario.notes) fmt::print("{}\n", note);
     fmt::print("\n");
   }
-  for (const auto& line : missed_limits(sweep)) fmt::print("MISSED {}\n", line);
 }
 
 /// The first seed of a single scenario, drawn; a suite has too many lines for one picture.
@@ -136,6 +135,8 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
   if (interrupt.flag())
     fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
   if (!options.quiet) print(scenarios, sweep);
+  // Also of a quiet run: a verdict without its reason helps nobody.
+  for (const auto& line : missed_limits(sweep)) fmt::print(stderr, "MISSED {}\n", line);
   const SweepOrigin origin{source, FTCS_VERSION};
   bool written =
       options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));

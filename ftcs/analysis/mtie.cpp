@@ -53,13 +53,17 @@ Peak largest_range(std::span<const double> x, std::size_t width) {
 
 }  // namespace
 
-std::vector<MtiePoint> mtie(PhaseRecord record, std::span<const std::size_t> averaging_factors) {
+std::vector<MtiePoint> mtie(PhaseRecord record, std::span<const std::size_t> averaging_factors,
+                            double confidence) {
   std::vector<MtiePoint> points;
   for (const std::size_t n : averaging_factors) {
     if (n == 0 || n + 1 > record.seconds.size()) continue;
     const Peak peak = largest_range(record.seconds, n + 1);
     if (peak.windows == 0) continue;
-    points.push_back({n, static_cast<double>(n) * record.interval_s, peak.range, peak.windows});
+    // Gaps count as record that is not there: windows + n points hold so many side by side.
+    const auto independent = static_cast<double>((peak.windows + n) / (n + 1));
+    points.push_back({n, static_cast<double>(n) * record.interval_s, peak.range, peak.windows,
+                      std::pow(1.0 - confidence, 1.0 / independent)});
   }
   return points;
 }

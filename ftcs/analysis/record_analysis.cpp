@@ -55,7 +55,7 @@ RecordAnalysis analyse_record(PhaseRecord record, double confidence) {
   analysis.overlapping_hadamard =
       stability(Deviation::kOverlappingHadamard, record, factors, confidence);
   analysis.time = stability(Deviation::kTime, record, factors, confidence);
-  analysis.wander = mtie(record, factors);
+  analysis.wander = mtie(record, factors, confidence);
   return analysis;
 }
 

@@ -17,7 +17,9 @@ FigureObserver::FigureObserver(const Scenario& scenario, RunTrace* trace)
       node_(scenario.world.nodes.size() - 1),
       trace_(trace),
       c5_(plan_.converged_band_ns, plan_.converged_dwell_cycles),
-      after_event_(plan_.converged_band_ns, plan_.converged_dwell_cycles) {}
+      after_event_(plan_.converged_band_ns, plan_.converged_dwell_cycles) {
+  if (trace_ != nullptr) trace_->interval_s = interval_s_;
+}
 
 void FigureObserver::add_truth(double cycle, double time_s, double error_ns) {
   if (measured(cycle)) time_error_.add(error_ns);
@@ -44,6 +46,7 @@ void FigureObserver::on_truth(const sim::TruthSample& sample) {
   if (!plan_.at_samples) add_truth(sample.cycle, sample.time_s, sample.time_error_ns);
   if (measured(sample.cycle)) rate_error_.add(sample.tracking_error_ppb);
   if (trace_ != nullptr) {
+    if (sample.cycle < plan_.from_cycle) trace_->first_measured = trace_->time_s.size() + 1;
     trace_->time_s.push_back(sample.time_s);
     trace_->time_error_ns.push_back(sample.time_error_ns);
     trace_->rate_error_ppb.push_back(sample.tracking_error_ppb);

@@ -17,6 +17,8 @@ struct RunTrace {
   std::vector<double> time_s;
   std::vector<double> time_error_ns;
   std::vector<double> rate_error_ppb;
+  std::size_t first_measured = 0;  ///< where the measurement window begins
+  double interval_s = 1.0;         ///< of one cycle
 };
 
 /// One servo, one seed. Memory does not depend on the length unless a trace is asked for.

@@ -69,7 +69,10 @@ Json to_json(std::span<const StabilityPoint> points) {
 Json to_json(std::span<const MtiePoint> points) {
   Json json = Json::array();
   for (const MtiePoint& point : points) {
-    json.push_back({{"tau_s", point.tau_s}, {"mtie_s", point.mtie_s}, {"windows", point.windows}});
+    json.push_back({{"tau_s", point.tau_s},
+                    {"mtie_s", point.mtie_s},
+                    {"windows", point.windows},
+                    {"covered_share", point.covered_share}});
   }
   return json;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/report/paper_report.h"
 
-#include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -40,16 +40,30 @@ Json row_json(const PaperResult& result, std::size_t i) {
               {"runs", figures.runs.size()}};
 }
 
-Plot figure_plot(const PaperResult& result) {
+/// The published runs in the cycles from `first` to before `last`.
+Plot figure_plot(const PaperResult& result, const char* part, std::size_t first, std::size_t last) {
   Plot plot;
-  plot.title = fmt::format("{}: perceived offset, seed {}", result.table.figure,
+  plot.title = fmt::format("{}, {}: perceived offset, seed {}", result.table.figure, part,
                            result.table.published_seed);
   plot.x_label = "cycle";
   plot.y_label = "local minus reference / ns";
   for (const auto& trace : result.traces) {
-    plot.series.push_back(trace_series(trace.row, trace.perceived_offset_ns, 1.0, 1.0));
+    PlotSeries series{trace.row, {}, {}, {}, {}};
+    for (std::size_t n = first; n < trace.perceived_offset_ns.size() && n < last; ++n) {
+      series.x.push_back(static_cast<double>(n));
+      series.y.push_back(trace.perceived_offset_ns[n]);
+    }
+    plot.series.push_back(std::move(series));
   }
   return plot;
+}
+
+/// Most of the plot would be the start's microseconds otherwise.
+void add_figure(HtmlReport& report, const PaperResult& result) {
+  if (result.traces.empty()) return;
+  const std::size_t settled = result.table.measure_from;
+  report.add_plot(figure_plot(result, "start", 0, settled));
+  report.add_plot(figure_plot(result, "settled", settled, std::numeric_limits<std::size_t>::max()));
 }
 
 }  // namespace
@@ -104,13 +118,14 @@ std::string paper_console(const PaperResult& result) {
   return text;
 }
 
-Json paper_json(const std::vector<PaperResult>& results, const std::string& version) {
+Json paper_json(const std::vector<PaperResult>& results, const std::string& version,
+                bool complete) {
   Json tables = Json::object();
   Json support = Json::object();
   Json figures = Json::object();
   Json checks = Json::array();
   Json choices = Json::array();
-  bool passed = true;
+  bool passed = complete;
   for (const PaperResult& result : results) {
     passed = passed && result.passed();
     Json& rows = tables[result.table.table] = Json::array();
@@ -130,6 +145,7 @@ Json paper_json(const std::vector<PaperResult>& results, const std::string& vers
   }
   return Json{{"program", "ftcs"},
               {"version", version},
+              {"complete", complete},
               {"passed", passed},
               {"tables", std::move(tables)},
               {"checks", std::move(checks)},
@@ -146,7 +162,7 @@ std::string paper_html(const std::vector<PaperResult>& results, const std::strin
         result.table.title, paper_table(result),
         fmt::format("{} seeds from {} on", result.table.seeds, result.table.first_seed));
     for (const auto& remark : result.table.remarks) report.add_note(remark);
-    if (!result.traces.empty()) report.add_plot(figure_plot(result));
+    add_figure(report, result);
     report.add_table("Choices", choices_table(result.table.choices));
     report.add_table("Checks", checks_table(result.checks));
   }

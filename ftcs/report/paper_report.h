@@ -17,8 +17,9 @@ namespace ftcs {
 /// All of it for the console.
 [[nodiscard]] std::string paper_console(const experiment::PaperResult& result);
 /// {"tables": {"table2": [...], ...}, "checks": [...], "choices": [...], "figures": {...}}.
+/// `complete`: nobody stopped the runs.
 [[nodiscard]] Json paper_json(const std::vector<experiment::PaperResult>& results,
-                              const std::string& version);
+                              const std::string& version, bool complete);
 [[nodiscard]] std::string paper_html(const std::vector<experiment::PaperResult>& results,
                                      const std::string& version);
 /// One table for all rows of all tables.

@@ -9,6 +9,7 @@
 
 #include "ftcs/report/html_report.h"
 #include "ftcs/report/number_format.h"
+#include "ftcs/report/trace_plots.h"
 
 namespace ftcs {
 namespace {
@@ -210,18 +211,10 @@ std::string sweep_html(const SweepResult& sweep, const SweepOrigin& origin,
                        const std::vector<experiment::RunTrace>& traces) {
   HtmlReport report("Clock servos compared", origin.suite);
   for (const std::string& line : missed_limits(sweep)) report.add_note(line, true);
-  if (!traces.empty()) {
-    Plot plot;
-    plot.title = "True time error, first seed";
-    plot.x_label = "time / s";
-    plot.y_label = "local minus reference / ns";
-    for (const auto& trace : traces)
-      plot.series.push_back({trace.servo, trace.time_s, trace.time_error_ns, {}, {}});
-    report.add_plot(plot);
-  }
   for (const ScenarioResult& scenario : sweep.scenarios) {
     report.add_table(scenario.scenario, ranking_table(scenario), scenario.title);
   }
+  for (const Plot& plot : trace_plots(traces)) report.add_plot(plot);
   report.add_parameters({{"source", origin.suite}, {"version", origin.version}});
   return report.render();
 }
