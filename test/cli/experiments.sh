@@ -58,6 +58,37 @@ expect 1 'empty.toml: no line of a known format' compare --log empty.toml
 expect 1 'binary.toml' compare --log binary.toml
 expect 1 'No space left on device' simulate good.toml -q --json /dev/full
 
+# Logs and records: cut off in the middle, compressed and cut off, no text at all.
+for i in $(seq 400); do echo "$i,$((i * 20000))"; done > data
+{ echo "time_s,offset_ns"; cat data; } > good.csv
+gzip -k good.csv
+head -c 900 good.csv.gz > cut.csv.gz
+head -c 20 good.csv > cut.csv
+expect 1 'cut.csv.gz' compare --log cut.csv.gz
+expect 1 'only 1 usable lines of 2; a replay needs three' compare --log cut.csv
+expect 1 'cut.csv.gz' analyse cut.csv.gz
+expect 1 'empty.toml' analyse empty.toml
+expect 1 'binary.toml' analyse binary.toml
+expect 1 'none.csv' analyse none.csv
+
+# A full disk takes one result, never the others or the console's table.
+expect 1 'No space left on device' compare --log good.csv -q --json /dev/full --csv kept-log.csv
+expect 1 'No space left on device' compare good.toml -q --html /dev/full --json kept-compare.json
+expect 1 'No space left on device' analyse good.csv -q --json /dev/full --csv kept-analyse.csv
+expect 1 'No space left on device' paper -q --json /dev/full --csv kept-paper.csv
+for kept in kept-log.csv kept-compare.json kept-analyse.csv kept-paper.csv; do
+  [ -s $kept ] || fail "a full disk for one result cost $kept"
+done
+"$ftcs" compare good.toml > /dev/full 2> err
+{ [ $? -eq 1 ] && grep -q 'cannot write to standard output' err; } || fail "a full standard output: $(cat err)"
+
+mkdir tables
+cp binary.toml tables/table2.toml
+expect 1 'tables/table2.toml' paper -q --experiments tables
+printf 'table = "table2"\ntitle = 3\n' > tables/table2.toml
+expect 1 'tables/table2.toml:2:' paper -q --experiments tables
+expect 1 'none' paper -q --experiments none
+
 # Shards and their merge are the whole, to the byte.
 "$ftcs" simulate good.toml -q --json whole.json || fail "a good scenario"
 for i in 1 2 3; do
@@ -78,6 +109,15 @@ wait $program
 [ $? -eq 1 ] || fail "an interrupted sweep must not succeed"
 grep -q '"complete": false' interrupted.json || fail "an interrupted sweep says that it is incomplete"
 grep -q '"seed": 1,' interrupted.json || fail "an interrupted sweep keeps its runs"
+
+"$ftcs" paper -q --seeds 100000 --json interrupted-paper.json > out 2> err &
+program=$!
+sleep 1
+kill -INT $program
+wait $program
+[ $? -eq 1 ] || fail "an interrupted paper must not succeed"
+grep -q '"complete": false' interrupted-paper.json || fail "an interrupted paper says that it is incomplete"
+grep -q '"row": "FTCS1"' interrupted-paper.json || fail "an interrupted paper keeps its rows"
 
 "$ftcs" compare --seeds 2 > out || fail "ftcs compare without arguments"
 tail -n 4 out | grep -q '^bound' || fail "the bound is the last row"
