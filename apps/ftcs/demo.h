@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/ftcs/live_view.h"
-#include "apps/ftcs/ptp_port.h"
+#include "apps/ftcs/ptp_core_port.h"
 #include "apps/ftcs/servo_trial.h"
 #include "ftcs/platform/child_process.h"
 #include "ftcs/ptp/time_receiver.h"
@@ -47,7 +47,7 @@ struct DemoResult {
 
 /// Time receiver of the demonstration: one protocol core, and every servo on its own virtual clock
 /// behind it.
-class DemoReceiver final : public PtpPort {
+class DemoReceiver final : public PtpCorePort<ptp::TimeReceiver> {
  public:
   DemoReceiver(platform::Kernel& kernel, const PtpOptions& options, const DemoOptions& demo,
                Log& log, std::unique_ptr<platform::TimestampClock> timestamps,
@@ -57,17 +57,6 @@ class DemoReceiver final : public PtpPort {
   [[nodiscard]] DemoResult result() const;
 
  private:
-  ptp::ActionList start(FreeRunningTime now) override;
-  ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
-                           FreeRunningTime now) override;
-  ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) override;
-  ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
-                          FreeRunningTime now) override;
-  ptp::ActionList on_timer(FreeRunningTime now) override;
-  ptp::ActionList on_link_change(bool up, FreeRunningTime now) override;
-  [[nodiscard]] std::optional<FreeRunningTime> deadline() const override {
-    return core_.deadline();
-  }
   void act(const ptp::Action& action) override;
   void housekeeping(FreeRunningTime now) override;
   [[nodiscard]] int finish() override;
@@ -77,7 +66,6 @@ class DemoReceiver final : public PtpPort {
 
   DemoOptions demo_;
   platform::ChildProcess& transmitter_;
-  ptp::TimeReceiver core_;
   TrueReference truth_;
   std::vector<std::unique_ptr<ServoTrial>> trials_;
   std::vector<double> one_way_ns_;  // t2 - t1 of every Sync, both on the common oscillator

@@ -51,10 +51,9 @@ DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
                            const DemoOptions& demo, Log& log,
                            std::unique_ptr<platform::TimestampClock> timestamps,
                            platform::ChildProcess& transmitter)
-    : PtpPort(kernel, options, log, std::move(timestamps)),
+    : PtpCorePort(kernel, options, log, std::move(timestamps), receiver_config(options)),
       demo_(demo),
       transmitter_(transmitter),
-      core_(receiver_config(options)),
       truth_{Duration::from_whole_ns(options.start->realtime_ns) -
              options.start->free_running.since_epoch()},
       view_(demo.live_view) {
@@ -70,29 +69,6 @@ DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
         ServoTrial::Setup{std::string(servo_kind_name(servo.kind)), discipline, start, truth_},
         oscillator()));
   }
-}
-
-ptp::ActionList DemoReceiver::start(FreeRunningTime now) { return core_.start(now); }
-
-ptp::ActionList DemoReceiver::on_event(std::span<const std::uint8_t> bytes,
-                                       FreeRunningTime received, FreeRunningTime now) {
-  return core_.on_event_message(bytes, received, now);
-}
-
-ptp::ActionList DemoReceiver::on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) {
-  return core_.on_general_message(bytes, now);
-}
-
-ptp::ActionList DemoReceiver::on_sent(std::uint16_t sequence_id,
-                                      std::optional<FreeRunningTime> sent, FreeRunningTime now) {
-  return sent ? core_.on_transmit_timestamp(sequence_id, *sent, now)
-              : core_.on_transmit_timestamp_missing(sequence_id, now);
-}
-
-ptp::ActionList DemoReceiver::on_timer(FreeRunningTime now) { return core_.on_timer(now); }
-
-ptp::ActionList DemoReceiver::on_link_change(bool up, FreeRunningTime now) {
-  return up ? core_.on_link_up(now) : core_.on_link_down(now);
 }
 
 void DemoReceiver::act(const ptp::Action& action) {

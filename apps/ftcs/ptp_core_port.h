@@ -35,10 +35,10 @@ class PtpCorePort : public PtpPort {
   ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) final {
     return core_.on_general_message(bytes, now);
   }
-  ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
+  ptp::ActionList on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
                           FreeRunningTime now) final {
-    return sent ? core_.on_transmit_timestamp(sequence_id, stamp_of(*sent), now)
-                : core_.on_transmit_timestamp_missing(sequence_id, now);
+    return sent ? core_.on_transmit_timestamp(id, stamp_of(*sent), now)
+                : core_.on_transmit_timestamp_missing(id, now);
   }
   ptp::ActionList on_timer(FreeRunningTime now) final { return core_.on_timer(now); }
   ptp::ActionList on_link_change(bool up, FreeRunningTime now) final {

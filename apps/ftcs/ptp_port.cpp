@@ -13,13 +13,6 @@
 namespace ftcs::app {
 namespace {
 
-// IEEE 1588-2019, 13.3.1: sequenceId.
-std::uint16_t sequence_id(std::span<const std::uint8_t> message) {
-  constexpr std::size_t kOffset = 30;
-  if (message.size() < kOffset + 2) return 0;
-  return static_cast<std::uint16_t>((message[kOffset] << 8) | message[kOffset + 1]);
-}
-
 VirtualClockConfig clock_config(const PtpOptions& options,
                                 const platform::TimestampClock::RealtimeReading& start) {
   VirtualClockConfig config;
@@ -67,7 +60,7 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (const auto due = deadline()) until = std::min(until, *due);
   transport_.wait_until(oscillator_.to_underlying(until));
   if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
-  for (const std::uint16_t id : std::exchange(unsent_, {})) {
+  for (const ptp::EventId& id : std::exchange(unsent_, {})) {
     perform(on_sent(id, std::nullopt, now()));
   }
   report_stamps();
@@ -117,7 +110,7 @@ void PtpPort::send(const ptp::SendMessage& message) {
                                      answer ? sender_ : std::optional<in_addr>{});
   if (error && !send_failed_) log_(LogLevel::kWarning, "{}", error->message());
   send_failed_ = error.has_value();  // one line for a series of failures
-  if (error && message.channel == ptp::Channel::kEvent) unsent_.push_back(message.sequence_id);
+  if (error && message.channel == ptp::Channel::kEvent) unsent_.push_back(message.id());
 }
 
 void PtpPort::on_message(const platform::ReceivedMessage& message) {
@@ -140,7 +133,7 @@ void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
          std::chrono::duration_cast<std::chrono::milliseconds>(options_.socket.tx_timestamp_timeout)
              .count());
   }
-  perform(on_sent(sequence_id(message.bytes), sent, now()));
+  perform(on_sent(ptp::event_id(message.bytes), sent, now()));
 }
 
 void PtpPort::on_link(bool up, const std::string& reason) {

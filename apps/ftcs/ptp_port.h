@@ -38,7 +38,7 @@ class PtpPort : private platform::TransportHandler {
   virtual ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
                                    FreeRunningTime now) = 0;
   virtual ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_sent(std::uint16_t sequence_id, std::optional<FreeRunningTime> sent,
+  virtual ptp::ActionList on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
                                   FreeRunningTime now) = 0;
   virtual ptp::ActionList on_timer(FreeRunningTime now) = 0;
   virtual ptp::ActionList on_link_change(bool up, FreeRunningTime now) = 0;
@@ -81,7 +81,7 @@ class PtpPort : private platform::TransportHandler {
   std::optional<in_addr> sender_{};  ///< of the message that is being handled
   std::optional<platform::StampSource> reported_stamps_{};
   bool send_failed_ = false;
-  std::vector<std::uint16_t> unsent_{};  ///< event messages that the network did not take
+  std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take
   std::optional<std::string> failure_{};
 };
 

@@ -8,32 +8,47 @@
 
 #include "ftcs/ptp/port_state.h"
 #include "ftcs/ptp/wire/codec.h"
+#include "ftcs/time/rate.h"
 #include "ftcs/time/timestamp_pair.h"
 
 namespace ftcs::ptp {
 
-/// UDP ports 319 and 320 (Annex C). Event messages need a transmit stamp.
+/// UDP ports 319 and 320 (Annexes C and D). Event messages need a transmit stamp.
 enum class Channel : std::uint8_t { kEvent, kGeneral };
 
 enum class Destination : std::uint8_t {
-  kMulticast,  ///< 224.0.1.129 (Annex C.3)
-  kPeer,       ///< the one address that the configuration names
-  kSender,     ///< where the message came from that is being handled
+  kMulticast,    ///< everybody: 224.0.1.129, ff0X::181, 01-1B-19-00-00-00 (Annexes C to E)
+  kNeighbour,    ///< peer delay messages: 224.0.0.107, ff02::6b, 01-80-C2-00-00-0E
+  kPeer,         ///< the one address that the configuration names
+  kSender,       ///< where the message came from that is being handled
+  kTransmitter,  ///< where the message came from with which SenderIsTransmitter came last
 };
 
-/// Send these octets. For Channel::kEvent the shell answers with on_transmit_timestamp(sequence_id,
-/// ...) or, if the stamp never comes, on_transmit_timestamp_missing(sequence_id, ...).
+/// Send these octets. For Channel::kEvent the shell answers with on_transmit_timestamp(id, ...) or,
+/// if the stamp never comes, on_transmit_timestamp_missing(id, ...).
 struct SendMessage {
   Channel channel = Channel::kGeneral;
   Destination destination = Destination::kMulticast;
   MessageType type = MessageType::kSync;
   std::uint16_t sequence_id = 0;
   MessageBytes bytes{};
+  [[nodiscard]] EventId id() const noexcept { return event_id(bytes.view()); }
 };
+
+/// The message that is being handled came from the followed transmitter: where it came from is the
+/// transmitter's address (Destination::kTransmitter).
+struct SenderIsTransmitter {};
 
 /// One timestamped message between the two clocks, for the servo.
 struct EmitPair {
   EventPair pair{};
+};
+
+/// One exchange of peer delay messages (11.4), for the measurement.
+struct EmitPeerDelay {
+  Duration mean_link_delay{};  ///< without asymmetry, by the reference, else the neighbour
+  Rate neighbor_rate_ratio;    ///< of the neighbour's clock in units of ours; 1 until known
+  bool first = false;          ///< the first one of this link: what was measured before is void
 };
 
 struct PortStateChanged {
@@ -68,14 +83,15 @@ struct ReferenceJumped {
   Duration jump{};
 };
 
-using Action = std::variant<SendMessage, EmitPair, PortStateChanged, TransmitterSeen,
-                            TransmitterSelected, ReferenceJumped>;
+using Action =
+    std::variant<SendMessage, EmitPair, EmitPeerDelay, SenderIsTransmitter, PortStateChanged,
+                 TransmitterSeen, TransmitterSelected, ReferenceJumped>;
 
 /// What an input brought about, in order. A value: actions may feed new inputs while the list is
 /// walked.
 class ActionList {
  public:
-  /// The longest list (Announce of a better transmitter at a time receiver) has four.
+  /// The longest list (the first Announce at a time receiver that has kept four pairs) has seven.
   static constexpr std::size_t kCapacity = 8;
 
   /// False if there is no room.

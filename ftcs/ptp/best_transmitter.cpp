@@ -28,9 +28,11 @@ bool better(const TransmitterData& a, const TransmitterData& b) noexcept {
   return grandmaster_rank(a.announce) < grandmaster_rank(b.announce);
 }
 
-bool ForeignTransmitters::qualified(const Record& record, FreeRunningTime now) noexcept {
-  return record.heard_twice &&
-         now - record.before_last <= multiply(record.announce_interval, kTimeWindowIntervals);
+bool ForeignTransmitters::qualified(const Record& record, FreeRunningTime now,
+                                    bool first_suffices) noexcept {
+  const Duration window = multiply(record.announce_interval, kTimeWindowIntervals);
+  if (first_suffices) return now - record.last <= window;
+  return record.heard_twice && now - record.before_last <= window;
 }
 
 const ForeignTransmitters::Record* ForeignTransmitters::find(
@@ -71,11 +73,13 @@ ForeignTransmitters::Heard ForeignTransmitters::hear(const TransmitterData& data
   return known ? Heard::kKnown : Heard::kNew;
 }
 
-const TransmitterData* ForeignTransmitters::best(const PortIdentity& selected,
-                                                 FreeRunningTime now) const noexcept {
+const TransmitterData* ForeignTransmitters::best(const PortIdentity& selected, FreeRunningTime now,
+                                                 bool first_suffices) const noexcept {
   const TransmitterData* best = nullptr;
   for (const Record& record : records_) {
-    if (!record.used || !(record.data.port == selected || qualified(record, now))) continue;
+    if (!record.used || !(record.data.port == selected || qualified(record, now, first_suffices))) {
+      continue;
+    }
     if (best == nullptr || better(record.data, *best)) best = &record.data;
   }
   return best;

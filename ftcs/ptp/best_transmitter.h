@@ -32,9 +32,10 @@ class ForeignTransmitters {
              const PortIdentity& selected = {}) noexcept;
 
   /// The best of the qualified ones and of `selected`, which needs no further qualification while
-  /// it is in the table; null if there is none. Valid until the next change.
-  [[nodiscard]] const TransmitterData* best(const PortIdentity& selected,
-                                            FreeRunningTime now) const noexcept;
+  /// it is in the table; null if there is none. With `first_suffices` one Announce within the
+  /// window qualifies. Valid until the next change.
+  [[nodiscard]] const TransmitterData* best(const PortIdentity& selected, FreeRunningTime now,
+                                            bool first_suffices = false) const noexcept;
   /// When `port` counts as silent: `intervals` announce intervals after its last Announce
   /// (9.2.6.12). None if unknown.
   [[nodiscard]] std::optional<FreeRunningTime> receipt_timeout(const PortIdentity& port,
@@ -52,7 +53,8 @@ class ForeignTransmitters {
     FreeRunningTime last{};
     FreeRunningTime before_last{};
   };
-  [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now) noexcept;
+  [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now,
+                                      bool first_suffices) noexcept;
   [[nodiscard]] const Record* find(const PortIdentity& port) const noexcept;
   [[nodiscard]] Record* place_for(const PortIdentity& port, const PortIdentity& selected,
                                   FreeRunningTime now) noexcept;

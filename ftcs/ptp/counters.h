@@ -19,15 +19,22 @@ enum class Counter : std::uint8_t {
   kFollowUpReceived,
   kDelayReqReceived,
   kDelayRespReceived,
+  kPdelayReqReceived,
+  kPdelayRespReceived,
+  kPdelayRespFollowUpReceived,
   // Sent.
   kAnnounceSent,
   kSyncSent,
   kFollowUpSent,
   kDelayReqSent,
   kDelayRespSent,
+  kPdelayReqSent,
+  kPdelayRespSent,
+  kPdelayRespFollowUpSent,
   // Given to the servo.
   kForwardPairs,
   kBackwardPairs,
+  kPeerDelays,
   // Refused by the decoder: the message is dropped.
   kTruncated,
   kOversized,
@@ -46,9 +53,10 @@ enum class Counter : std::uint8_t {
   kAlternateTransmitter,  ///< alternateMasterFlag is set (17.3)
   kManagementIgnored,
   kSignalingIgnored,
-  kPdelayIgnored,
-  kWrongChannel,  ///< event message without a receive stamp, as it came on the general port
-  kNotListening,  ///< while initializing, faulty or without a selected transmitter
+  kPdelayIgnored,  ///< peer delay messages at a port that measures end to end
+  kDelayIgnored,   ///< Delay_Req and Delay_Resp at a port that measures peer to peer
+  kWrongChannel,   ///< event message without a receive stamp, as it came on the general port
+  kNotListening,   ///< while initializing, faulty or without a selected transmitter
   // Order and loss of Sync and Follow_Up.
   kMissedSync,         ///< gaps in the sequence; nothing to do
   kDuplicateSync,      ///< second copy dropped
@@ -66,6 +74,19 @@ enum class Counter : std::uint8_t {
   kLostDelayResp,   ///< a request that was never answered: forgotten
   kMissingTransmitStamp,     ///< the exchange (receiver) or the Follow_Up (transmitter) is left out
   kUnexpectedTransmitStamp,  ///< for a message that we do not wait for: ignored
+  // Peer delay (11.4).
+  kLostPdelayResp,          ///< a request that was never answered: forgotten
+  kLostPdelayRespFollowUp,  ///< a two-step answer whose Follow_Up did not come: forgotten
+  kStalePdelayResp,         ///< an answer to no open request (late, duplicate or forged): dropped
+  kWrongPeer,               ///< a Pdelay_Resp_Follow_Up of another port than the answer: dropped
+  kSeveralResponders,       ///< two ports answer one request: what is there is no link between two
+                            ///< ports.
+                            ///< No delay is taken until three requests have had one answer each
+  kAbsurdPeerDelay,         ///< beyond ±kMaximumPeerDelay: dropped
+  kPeerRateRestarts,        ///< the neighbour's clock was stepped: its rate is measured anew
+  kNotCapable,  ///< Announce, Sync and Follow_Up that were dropped as the neighbour is not (yet)
+                ///< known
+                ///< to speak IEEE 802.1AS (asCapable)
   // Values.
   kNegativeCorrection,  ///< used: 11.6 may make it negative
   kAbsurdCorrection,    ///< beyond kMaximumCorrection: the message is dropped
@@ -78,6 +99,8 @@ enum class Counter : std::uint8_t {
   kAnnounceTimeouts,  ///< the selected transmitter stopped: back to LISTENING, or to the next best
                       ///< one
   kForeignTableFull,  ///< a newcomer was ignored
+  kSyncTimeouts,      ///< its Syncs stopped while it still announces (syncReceiptTimeout): as above
+  kUnacceptableTransmitter,  ///< not in the table of acceptable ones (17.5): dropped
   kUnusableAnnounce,  ///< 255 steps removed or more, or a clock that claims our identity (9.3.2.5)
   kLinkDown,
   kActionsDropped,  ///< more actions at once than the list holds; a test shows that it stays zero

@@ -163,9 +163,9 @@ class World {
       const int generation = transmitter_generation_;
       at(now_ + uniform(network_.stamp_delay), [this, message, sent, missing, generation] {
         if (!transmitter_ || generation != transmitter_generation_) return;
-        perform_transmitter(
-            missing ? transmitter_->on_transmit_timestamp_missing(message.sequence_id, raw())
-                    : transmitter_->on_transmit_timestamp(message.sequence_id, sent, raw()));
+        perform_transmitter(missing
+                                ? transmitter_->on_transmit_timestamp_missing(message.id(), raw())
+                                : transmitter_->on_transmit_timestamp(message.id(), sent, raw()));
       });
     }
   }
@@ -192,8 +192,8 @@ class World {
     }
     const bool missing = chance() < network_.missing_stamps;
     at(now_ + uniform(network_.stamp_delay), [this, message, sent, missing] {
-      perform(missing ? receiver_->on_transmit_timestamp_missing(message.sequence_id, local())
-                      : receiver_->on_transmit_timestamp(message.sequence_id, sent, local()));
+      perform(missing ? receiver_->on_transmit_timestamp_missing(message.id(), local())
+                      : receiver_->on_transmit_timestamp(message.id(), sent, local()));
     });
   }
 

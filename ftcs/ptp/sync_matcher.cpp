@@ -14,6 +14,12 @@ std::optional<EventPair> SyncMatcher::on_sync(const Header& header, const Sync& 
   Slot* slot = find(header.sequence_id);
   if (slot != nullptr && slot->state != SlotState::kFollowUpWaits) {
     counters.add(Counter::kDuplicateSync);
+    // A copy, or the Sync of a transmitter that has been started again: which of the two the
+    // Follow_Up will belong to, nobody can tell.
+    if (slot->state == SlotState::kSyncWaits &&
+        abs(received - slot->received) > Duration{kLatestCopy}) {
+      slot->state = SlotState::kDone;
+    }
     return std::nullopt;
   }
   if (!admit_sync(header.sequence_id, now, counters)) return std::nullopt;

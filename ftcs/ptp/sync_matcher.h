@@ -23,6 +23,8 @@ class SyncMatcher {
   /// A part whose counterpart has not come after this time is forgotten. Long against any queue,
   /// short against the time in which 16-bit sequence ids at 128 Hz come round (512 s).
   static constexpr Nanoseconds kMatchTimeout{1'000'000'000};
+  /// No network delivers a copy so late, and no program is started again so soon.
+  static constexpr Nanoseconds kLatestCopy{100'000'000};
   /// Sequence ids this close are reordering or loss; further apart, the transmitter has restarted.
   static constexpr int kReorderWindow = 16;
 

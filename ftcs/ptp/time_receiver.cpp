@@ -1,60 +1,77 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/ptp/time_receiver.h"
 
-#include <variant>
+#include <algorithm>
 
 #include "ftcs/ptp/interval.h"
 
 namespace ftcs::ptp {
 namespace {
 
-/// 9.3.2.5: a data set that has come this far is worth nothing.
-constexpr std::uint16_t kMaximumStepsRemoved = 255;
-
-/// 11.3.2: every Delay_Resp takes the fraction of its stamp off the correction. That is no finding.
-constexpr Duration kUsualNegativeCorrection{Nanoseconds{-1}};
-
 bool same_reference(const TransmitterData& a, const TransmitterData& b) noexcept {
   return a.port == b.port && a.announce.grandmaster == b.announce.grandmaster;
+}
+
+PortConfig port_config(const TimeReceiverConfig& config) noexcept {
+  return {config.port,          config.domain,  config.major_sdo_id,
+          config.minor_version, config.unicast, config.assume_two_step};
+}
+
+/// The earlier one of two times that may be unknown.
+std::optional<FreeRunningTime> earlier(std::optional<FreeRunningTime> a,
+                                       std::optional<FreeRunningTime> b) noexcept {
+  if (!a || !b) return a ? a : b;
+  return std::min(*a, *b);
 }
 
 }  // namespace
 
 TimeReceiver::TimeReceiver(const Config& config) noexcept
-    : config_(config), delay_requests_(config.log_min_delay_req_interval, config.seed) {}
+    : config_(config),
+      port_(port_config(config)),
+      peer_delay_(config.peer_delay),
+      delay_requests_(config.log_min_delay_req_interval, config.seed) {}
 
-ActionList TimeReceiver::start(FreeRunningTime) noexcept {
+ActionList TimeReceiver::start(FreeRunningTime now) noexcept {
   ActionList actions;
-  if (state_ == PortState::kInitializing) {
-    change_state(PortState::kListening, PortEvent::kInitComplete, actions);
-  }
+  if (port_.state() != PortState::kInitializing) return actions;
+  if (peer_to_peer()) peer_delay_.start(now);
+  port_.change_state(PortState::kListening, PortEvent::kInitComplete, actions);
   return actions;
 }
 
 ActionList TimeReceiver::on_event_message(std::span<const std::uint8_t> bytes,
                                           FreeRunningTime received, FreeRunningTime now) noexcept {
   ActionList actions;
-  handle(bytes, Input{received, now}, actions);
+  if (const auto message = port_.read(bytes)) dispatch(*message, Input{received, now}, actions);
   return actions;
 }
 
 ActionList TimeReceiver::on_general_message(std::span<const std::uint8_t> bytes,
                                             FreeRunningTime now) noexcept {
   ActionList actions;
-  handle(bytes, Input{std::nullopt, now}, actions);
+  if (const auto message = port_.read(bytes)) dispatch(*message, Input{std::nullopt, now}, actions);
   return actions;
 }
 
-ActionList TimeReceiver::on_transmit_timestamp(std::uint16_t sequence_id, FreeRunningTime sent,
+ActionList TimeReceiver::on_transmit_timestamp(const EventId& id, FreeRunningTime sent,
                                                FreeRunningTime now) noexcept {
   ActionList actions;
-  emit(delay_requests_.on_sent(sequence_id, sent, counters_), now, actions);
+  if (id.type == MessageType::kDelayReq) {
+    emit(delay_requests_.on_sent(id.sequence_id, sent, port_.counters()), now, actions);
+  } else {
+    peer_delay_.on_sent(id, sent, port_, actions);
+  }
   return actions;
 }
 
-ActionList TimeReceiver::on_transmit_timestamp_missing(std::uint16_t sequence_id,
+ActionList TimeReceiver::on_transmit_timestamp_missing(const EventId& id,
                                                        FreeRunningTime) noexcept {
-  delay_requests_.on_stamp_missing(sequence_id, counters_);
+  if (id.type == MessageType::kDelayReq) {
+    delay_requests_.on_stamp_missing(id.sequence_id, port_.counters());
+  } else {
+    peer_delay_.on_stamp_missing(id, port_);
+  }
   return {};
 }
 
@@ -63,42 +80,60 @@ ActionList TimeReceiver::on_timer(FreeRunningTime now) noexcept {
   const auto timeout = has_transmitter_ ? foreign_.receipt_timeout(transmitter_.port,
                                                                    config_.announce_receipt_timeout)
                                         : std::nullopt;
+  const auto silence = sync_timeout();
   if (timeout && now >= *timeout) {
-    counters_.add(Counter::kAnnounceTimeouts);
-    foreign_.forget(transmitter_.port);
-    has_transmitter_ = false;
-    forget_exchanges();
-    change_state(PortState::kListening, PortEvent::kAnnounceReceiptTimeoutExpires, actions);
-    decide(now, actions);
+    lose_transmitter(Counter::kAnnounceTimeouts, now, actions);
+  } else if (silence && now >= *silence) {
+    lose_transmitter(Counter::kSyncTimeouts, now, actions);
   }
+  peer_delay_.on_timer(now, port_, actions);
   send_delay_req_if_due(now, actions);
   return actions;
 }
 
-ActionList TimeReceiver::on_link_down(FreeRunningTime) noexcept {
-  ActionList actions;
-  if (state_ == PortState::kFaulty || state_ == PortState::kInitializing) return actions;
-  counters_.add(Counter::kLinkDown);
-  foreign_.clear();
+void TimeReceiver::lose_transmitter(Counter reason, FreeRunningTime now,
+                                    ActionList& actions) noexcept {
+  port_.count(reason);
+  foreign_.forget(transmitter_.port);
   has_transmitter_ = false;
   forget_exchanges();
-  change_state(PortState::kFaulty, PortEvent::kFaultDetected, actions);
+  port_.change_state(PortState::kListening, PortEvent::kAnnounceReceiptTimeoutExpires, actions);
+  decide(now, actions);
+}
+
+std::optional<FreeRunningTime> TimeReceiver::sync_timeout() const noexcept {
+  if (!has_transmitter_ || config_.sync_receipt_timeout == 0 || !sync_interval_) {
+    return std::nullopt;
+  }
+  return last_sync_ + multiply(*sync_interval_, config_.sync_receipt_timeout);
+}
+
+ActionList TimeReceiver::on_link_down(FreeRunningTime) noexcept {
+  ActionList actions;
+  if (!port_.is_active()) return actions;
+  port_.count(Counter::kLinkDown);
+  foreign_.clear();
+  fast_start_.clear();
+  peer_delay_.stop();
+  has_transmitter_ = false;
+  forget_exchanges();
+  port_.change_state(PortState::kFaulty, PortEvent::kFaultDetected, actions);
   return actions;
 }
 
-ActionList TimeReceiver::on_link_up(FreeRunningTime) noexcept {
+ActionList TimeReceiver::on_link_up(FreeRunningTime now) noexcept {
   ActionList actions;
-  if (state_ == PortState::kFaulty) {
-    change_state(PortState::kListening, PortEvent::kInitComplete, actions);
-  }
+  if (port_.state() != PortState::kFaulty) return actions;
+  if (peer_to_peer()) peer_delay_.start(now);
+  port_.change_state(PortState::kListening, PortEvent::kInitComplete, actions);
   return actions;
 }
 
 ActionList TimeReceiver::on_servo_locked(FreeRunningTime) noexcept {
   ActionList actions;
   servo_locked_ = true;
-  if (state_ == PortState::kUncalibrated) {
-    change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
+  if (port_.state() == PortState::kUncalibrated) {
+    port_.change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
   }
   return actions;
 }
@@ -106,197 +141,78 @@ ActionList TimeReceiver::on_servo_locked(FreeRunningTime) noexcept {
 ActionList TimeReceiver::on_servo_unlocked(FreeRunningTime) noexcept {
   ActionList actions;
   servo_locked_ = false;
-  if (state_ == PortState::kTimeReceiver) {
-    change_state(PortState::kUncalibrated, PortEvent::kSynchronizationFault, actions);
+  if (port_.state() == PortState::kTimeReceiver) {
+    port_.change_state(PortState::kUncalibrated, PortEvent::kSynchronizationFault, actions);
   }
   return actions;
 }
 
 std::optional<FreeRunningTime> TimeReceiver::deadline() const noexcept {
-  if (!has_transmitter_) return std::nullopt;
-  const auto timeout =
-      foreign_.receipt_timeout(transmitter_.port, config_.announce_receipt_timeout);
-  const auto request = delay_requests_.deadline();
-  if (!timeout || !request) return timeout ? timeout : request;
-  return *timeout < *request ? timeout : request;
+  auto next = earlier(delay_requests_.deadline(), peer_delay_.deadline());
+  if (!has_transmitter_) return next;
+  next =
+      earlier(next, foreign_.receipt_timeout(transmitter_.port, config_.announce_receipt_timeout));
+  return earlier(next, sync_timeout());
 }
 
 const TransmitterData* TimeReceiver::transmitter() const noexcept {
   return has_transmitter_ ? &transmitter_ : nullptr;
 }
 
-void TimeReceiver::handle(std::span<const std::uint8_t> bytes, const Input& input,
-                          ActionList& actions) noexcept {
-  if (state_ == PortState::kInitializing || state_ == PortState::kFaulty) {
-    counters_.add(Counter::kNotListening);
-    return;
-  }
-  const auto message = decode(bytes);
-  if (!message) {
-    counters_.add(counter_of(message.error().reason));
-    return;
-  }
-  if (is_for_us(message->header)) dispatch(*message, input, actions);
-}
-
-bool TimeReceiver::is_for_us(const Header& header) noexcept {
-  if (header.major_sdo_id != config_.major_sdo_id) {
-    counters_.add(Counter::kWrongSdo);
-  } else if (header.domain != config_.domain) {
-    counters_.add(Counter::kWrongDomain);
-  } else if (header.source == config_.port) {
-    counters_.add(Counter::kOwnMessage);
-  } else if (header.has(flag::kAlternateTransmitter)) {
-    counters_.add(Counter::kAlternateTransmitter);
-  } else {
-    return true;
-  }
-  return false;
-}
-
-void TimeReceiver::dispatch(const Message& message, const Input& input,
-                            ActionList& actions) noexcept {
-  switch (type_of(message.body)) {
-    case MessageType::kAnnounce:
-      return on_announce(message.header, *std::get_if<Announce>(&message.body), input.now, actions);
-    case MessageType::kSync:
-      return on_sync(message.header, *std::get_if<Sync>(&message.body), input, actions);
-    case MessageType::kFollowUp:
-      return on_follow_up(message.header, *std::get_if<FollowUp>(&message.body), input.now,
-                          actions);
-    case MessageType::kDelayResp:
-      return on_delay_resp(message.header, *std::get_if<DelayResp>(&message.body), input.now,
-                           actions);
-    case MessageType::kDelayReq:
-      return counters_.add(Counter::kNotForThisRole);
-    case MessageType::kPdelayReq:
-    case MessageType::kPdelayResp:
-    case MessageType::kPdelayRespFollowUp:
-      return counters_.add(Counter::kPdelayIgnored);
-    case MessageType::kSignaling:
-      return counters_.add(Counter::kSignalingIgnored);
-    case MessageType::kManagement:
-      return counters_.add(Counter::kManagementIgnored);
-  }
-}
-
-bool TimeReceiver::from_transmitter(const Header& header) noexcept {
-  if (!has_transmitter_) {
-    counters_.add(Counter::kNotListening);
-    return false;
-  }
-  if (header.source != transmitter_.port) {
-    counters_.add(Counter::kWrongTransmitter);
-    return false;
-  }
-  return true;
-}
-
-bool TimeReceiver::usable_correction(const Header& header) noexcept {
-  if (abs(header.correction) > Duration{kMaximumCorrection}) {
-    counters_.add(Counter::kAbsurdCorrection);
-    return false;
-  }
-  if (header.correction < kUsualNegativeCorrection) counters_.add(Counter::kNegativeCorrection);
-  return true;
-}
-
-void TimeReceiver::on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
-                               ActionList& actions) noexcept {
-  if (announce.steps_removed >= kMaximumStepsRemoved || header.source.clock == config_.port.clock ||
-      announce.grandmaster == config_.port.clock) {
-    counters_.add(Counter::kUnusableAnnounce);
-    return;
-  }
-  counters_.add(Counter::kAnnounceReceived);
-  auto interval = interval_from_log(header.log_interval);
-  if (!interval) {
-    if (header.log_interval != kNoLogInterval) counters_.add(Counter::kBadInterval);
-    interval = interval_from_log(config_.log_announce_interval);
-  }
-  TransmitterData data{header.source, announce, header.flags};
-  data.announce.origin = {};  // differs in each message and says nothing about the transmitter
-  const auto heard = foreign_.hear(data, interval.value_or(Duration{std::chrono::seconds{1}}), now,
-                                   has_transmitter_ ? transmitter_.port : PortIdentity{});
-  if (heard == ForeignTransmitters::Heard::kTableFull) counters_.add(Counter::kForeignTableFull);
-  if (heard == ForeignTransmitters::Heard::kNew) push(TransmitterSeen{header.source}, actions);
-  decide(now, actions);
-}
-
-void TimeReceiver::on_sync(const Header& header, const Sync& sync, const Input& input,
-                           ActionList& actions) noexcept {
-  if (!input.received) return counters_.add(Counter::kWrongChannel);
-  if (!from_transmitter(header) || !usable_correction(header)) return;
-  counters_.add(Counter::kSyncReceived);
-  if (const auto interval = interval_from_log(header.log_interval)) sync_interval_ = interval;
-  emit(matcher_.on_sync(header, sync, *input.received, input.now, counters_), input.now, actions);
-  if (!delay_requests_.running()) delay_requests_.start(input.now);
-  send_delay_req_if_due(input.now, actions);
-}
-
-void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
-                                FreeRunningTime now, ActionList& actions) noexcept {
-  if (!from_transmitter(header) || !usable_correction(header)) return;
-  counters_.add(Counter::kFollowUpReceived);
-  emit(matcher_.on_follow_up(header, follow_up, now, counters_), now, actions);
-}
-
-void TimeReceiver::on_delay_resp(const Header& header, const DelayResp& response,
-                                 FreeRunningTime now, ActionList& actions) noexcept {
-  if (!from_transmitter(header)) return;
-  if (response.requesting_port != config_.port) {
-    counters_.add(Counter::kWrongRequestingPort);
-    return;
-  }
-  if (!usable_correction(header)) return;
-  counters_.add(Counter::kDelayRespReceived);
-  delay_requests_.honour(header.log_interval, now, counters_);
-  emit(delay_requests_.on_response(header, response, counters_), now, actions);
+std::optional<Rate> TimeReceiver::grandmaster_rate_ratio() const noexcept {
+  if (!has_information_) return std::nullopt;
+  return Rate::from_ratio(1.0 + information_.cumulative_rate_offset()) *
+         peer_delay_.neighbor_rate_ratio();
 }
 
 /// State decision (9.3.3) of a clock that never transmits: follow the best, if there is one.
 void TimeReceiver::decide(FreeRunningTime now, ActionList& actions) noexcept {
   const PortIdentity selected = has_transmitter_ ? transmitter_.port : PortIdentity{};
-  const TransmitterData* const best = foreign_.best(selected, now);
+  const bool first_suffices = config_.fast_start && !has_transmitter_;
+  const TransmitterData* const best = foreign_.best(selected, now, first_suffices);
   if (best == nullptr || (has_transmitter_ && *best == transmitter_)) return;
-  select(*best, actions);
+  select(*best, now, actions);
 }
 
-void TimeReceiver::select(const TransmitterData& data, ActionList& actions) noexcept {
+void TimeReceiver::select(const TransmitterData& data, FreeRunningTime now,
+                          ActionList& actions) noexcept {
   const bool same_port = has_transmitter_ && transmitter_.port == data.port;
+  const bool measured = !has_transmitter_ && fast_start_.is_candidate(data.port);
   const bool changed = !had_transmitter_ || !same_reference(data, transmitter_);
   transmitter_ = data;
   has_transmitter_ = true;
   had_transmitter_ = true;
   if (changed) {
-    counters_.add(Counter::kTransmitterChanges);
+    port_.count(Counter::kTransmitterChanges);
     servo_locked_ = false;  // locked to something else
   }
-  push(TransmitterSelected{data, changed}, actions);
+  port_.push(TransmitterSelected{data, changed}, actions);
   if (same_port) return;
-  forget_exchanges();
-  if (state_ != PortState::kUncalibrated) {
-    change_state(PortState::kUncalibrated, PortEvent::kRecommendedReceiver, actions);
+  if (!measured) forget_exchanges();
+  last_sync_ = now;
+  if (port_.state() != PortState::kUncalibrated) {
+    port_.change_state(PortState::kUncalibrated, PortEvent::kRecommendedReceiver, actions);
   }
+  if (measured) {
+    for (const EventPair& pair : fast_start_) deliver(pair, actions);
+  }
+  fast_start_.clear();
+}
+
+void TimeReceiver::deliver(const EventPair& pair, ActionList& actions) noexcept {
+  port_.count(pair.direction == Direction::kForward ? Counter::kForwardPairs
+                                                    : Counter::kBackwardPairs);
+  port_.push(EmitPair{pair}, actions);
 }
 
 void TimeReceiver::send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept {
-  const auto sequence_id = delay_requests_.begin_if_due(now, counters_);
+  const auto sequence_id = delay_requests_.begin_if_due(now, port_.counters());
   if (!sequence_id) return;
-  Message message;
-  message.header.major_sdo_id = config_.major_sdo_id;
-  message.header.minor_version = config_.minor_version;
-  message.header.domain = config_.domain;
-  message.header.flags = config_.unicast ? flag::kUnicast : std::uint16_t{0};
-  message.header.source = config_.port;
-  message.header.sequence_id = *sequence_id;
-  message.body = DelayReq{};  // 11.3.2: origin zero, as we have no time to tell
-  const auto bytes = encode(message);
-  if (!bytes) return counters_.add(Counter::kUnusableTime);
-  counters_.add(Counter::kDelayReqSent);
-  push(SendMessage{Channel::kEvent, config_.unicast ? Destination::kPeer : Destination::kMulticast,
-                   MessageType::kDelayReq, *sequence_id, *bytes},
-       actions);
+  // 11.3.2: origin zero, as we have no time to tell.
+  Message message{port_.header(*sequence_id, kNoLogInterval), DelayReq{}};
+  if (config_.hybrid) message.header.flags |= flag::kUnicast;
+  port_.send(message, config_.hybrid ? Destination::kTransmitter : Destination::kMulticast,
+             Counter::kDelayReqSent, actions);
 }
 
 void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
@@ -305,16 +221,13 @@ void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
   // t2 = t1 + (mean + asymmetry) + offset and t4 = t3 + (mean - asymmetry) - offset: added to both,
   // the mean remains.
   pair->reference = pair->reference + config_.delay_asymmetry;
-  if (pair->direction == Direction::kForward) {
-    counters_.add(Counter::kForwardPairs);
-    check_for_jump(*pair, now, actions);
-    if (servo_locked_ && state_ == PortState::kUncalibrated) {
-      change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
-    }
-  } else {
-    counters_.add(Counter::kBackwardPairs);
+  if (pair->direction == Direction::kForward) check_for_jump(*pair, now, actions);
+  if (!has_transmitter_) return fast_start_.keep(*pair);
+  if (pair->direction == Direction::kForward && servo_locked_ &&
+      port_.state() == PortState::kUncalibrated) {
+    port_.change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
   }
-  push(EmitPair{*pair}, actions);
+  deliver(*pair, actions);
 }
 
 void TimeReceiver::check_for_jump(const EventPair& forward, FreeRunningTime now,
@@ -326,27 +239,20 @@ void TimeReceiver::check_for_jump(const EventPair& forward, FreeRunningTime now,
   const Duration jump = (forward.reference - last.pair.reference) - elapsed;
   const Duration tolerance = Duration{kJumpTolerance} + abs(elapsed).half().half().half();
   if (abs(jump) <= tolerance) return;
-  counters_.add(Counter::kReferenceJumps);
+  port_.count(Counter::kReferenceJumps);
   // A request from before the jump would be answered after it: half the jump would look like delay.
-  if (delay_requests_.running()) delay_requests_.restart(now, counters_);
-  push(ReferenceJumped{jump}, actions);
+  if (delay_requests_.running()) delay_requests_.restart(now, port_.counters());
+  fast_start_.forget_pairs();
+  if (has_transmitter_) port_.push(ReferenceJumped{jump}, actions);
 }
 
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
-  delay_requests_.stop(counters_);
+  delay_requests_.stop(port_.counters());
   last_forward_ = LastPair{};
+  has_information_ = false;
+  peer_delay_.set_reference_rate(Rate{});
   sync_interval_.reset();
-}
-
-void TimeReceiver::change_state(PortState to, PortEvent event, ActionList& actions) noexcept {
-  const PortState from = state_;
-  state_ = to;
-  push(PortStateChanged{from, to, event}, actions);
-}
-
-void TimeReceiver::push(const Action& action, ActionList& actions) noexcept {
-  if (!actions.push(action)) counters_.add(Counter::kActionsDropped);
 }
 
 }  // namespace ftcs::ptp

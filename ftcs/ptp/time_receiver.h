@@ -5,10 +5,13 @@
 #include <optional>
 #include <span>
 
+#include "ftcs/ptp/acceptable_transmitters.h"
 #include "ftcs/ptp/actions.h"
 #include "ftcs/ptp/best_transmitter.h"
-#include "ftcs/ptp/counters.h"
 #include "ftcs/ptp/delay_requests.h"
+#include "ftcs/ptp/fast_start.h"
+#include "ftcs/ptp/peer_delay.h"
+#include "ftcs/ptp/port.h"
 #include "ftcs/ptp/sync_matcher.h"
 
 namespace ftcs::ptp {
@@ -22,6 +25,20 @@ struct TimeReceiverConfig {
   std::uint8_t announce_receipt_timeout = 3;   ///< announce intervals, 7.7.3.1; valid: 2 to 10
   std::int8_t log_min_delay_req_interval = 0;  ///< until a Delay_Resp demands another one
   bool unicast = false;  ///< Delay_Req to the one configured peer instead of multicast
+  /// Delay_Req to the transmitter's own address, everything else by multicast (ptp4l: hybrid_e2e).
+  bool hybrid = false;
+  DelayMechanism delay_mechanism = DelayMechanism::kEndToEnd;
+  /// With capability_needed Announce, Sync and Follow_Up are dropped until the neighbour is
+  /// capable.
+  PeerDelayConfig peer_delay{};
+  bool assume_two_step = false;  ///< of Sync and Pdelay_Resp, see PortConfig
+  /// Sync intervals after which a transmitter that only announces counts as silent
+  /// (802.1AS-2020, 10.7.3.1). 0: never.
+  std::uint8_t sync_receipt_timeout = 0;
+  AcceptableTransmitters acceptable{};  ///< empty: all
+  /// While no transmitter is selected: its first Announce selects it (9.3.2.5 wants two), and the
+  /// Syncs that come before are measured already.
+  bool fast_start = false;
   /// delayAsymmetry (7.4.2): positive if the way to us is longer than the way back. Added to both
   /// pairs' reference (11.6.2, 11.6.3); leave it zero where the measurement layer is given it.
   Duration delay_asymmetry{};
@@ -35,8 +52,8 @@ inline constexpr Nanoseconds kMaximumCorrection{1'000'000'000};
 /// (a leap second).
 inline constexpr Nanoseconds kJumpTolerance{500'000'000};
 
-/// An IEEE 1588-2019 ordinary clock that only receives time: end-to-end delay (11.3), best
-/// transmitter (9.3).
+/// An IEEE 1588-2019 ordinary clock that only receives time: end-to-end (11.3) or peer-to-peer
+/// (11.4) delay, best transmitter (9.3).
 ///
 /// Sans-I/O: bytes and stamps go in, actions come out; it reads no clock and sends nothing itself.
 /// `now` and all event stamps are readings of the free-running clock. `now` must not run backward.
@@ -57,10 +74,10 @@ class TimeReceiver {
   [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
                                               FreeRunningTime now) noexcept;
   /// When the event message with this id left us.
-  [[nodiscard]] ActionList on_transmit_timestamp(std::uint16_t sequence_id, FreeRunningTime sent,
+  [[nodiscard]] ActionList on_transmit_timestamp(const EventId& id, FreeRunningTime sent,
                                                  FreeRunningTime now) noexcept;
   /// It is not known and never will be when the event message with this id left us.
-  [[nodiscard]] ActionList on_transmit_timestamp_missing(std::uint16_t sequence_id,
+  [[nodiscard]] ActionList on_transmit_timestamp_missing(const EventId& id,
                                                          FreeRunningTime now) noexcept;
   [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
   /// To FAULTY; transmitter and open exchanges are forgotten.
@@ -77,12 +94,17 @@ class TimeReceiver {
   /// When on_timer() must be called, if no other input comes first. May lie in the past: then at
   /// once.
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
-  [[nodiscard]] PortState state() const noexcept { return state_; }
+  [[nodiscard]] PortState state() const noexcept { return port_.state(); }
   /// The selected transmitter; null if there is none.
   [[nodiscard]] const TransmitterData* transmitter() const noexcept;
+  /// What the neighbour at the other end of the link measured as; peer to peer only.
+  [[nodiscard]] const PeerDelay& peer_delay() const noexcept { return peer_delay_; }
+  /// Rate of the grandmaster in units of our oscillator by the Follow_Up information (802.1AS-2020,
+  /// 10.2.8.1.4); none where the transmitter sends none.
+  [[nodiscard]] std::optional<Rate> grandmaster_rate_ratio() const noexcept;
   /// Its Sync interval, once a multicast Sync has told it.
   [[nodiscard]] std::optional<Duration> sync_interval() const noexcept { return sync_interval_; }
-  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const Counters& counters() const noexcept { return port_.counters(); }
 
  private:
   struct Input {
@@ -94,11 +116,9 @@ class TimeReceiver {
     EventPair pair{};
   };
 
-  void handle(std::span<const std::uint8_t> bytes, const Input& input,
-              ActionList& actions) noexcept;
   void dispatch(const Message& message, const Input& input, ActionList& actions) noexcept;
-  [[nodiscard]] bool is_for_us(const Header& header) noexcept;
-  [[nodiscard]] bool from_transmitter(const Header& header) noexcept;
+  [[nodiscard]] bool usable_source(const Header& header) noexcept;
+  [[nodiscard]] bool from_transmitter(const Message& message, FreeRunningTime now) noexcept;
   [[nodiscard]] bool usable_correction(const Header& header) noexcept;
   void on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
                    ActionList& actions) noexcept;
@@ -108,18 +128,25 @@ class TimeReceiver {
                     ActionList& actions) noexcept;
   void on_delay_resp(const Header& header, const DelayResp& response, FreeRunningTime now,
                      ActionList& actions) noexcept;
+  void follow_information(const FollowUp& follow_up, ActionList& actions) noexcept;
   void decide(FreeRunningTime now, ActionList& actions) noexcept;
-  void select(const TransmitterData& data, ActionList& actions) noexcept;
+  void select(const TransmitterData& data, FreeRunningTime now, ActionList& actions) noexcept;
+  void deliver(const EventPair& pair, ActionList& actions) noexcept;
+  void lose_transmitter(Counter reason, FreeRunningTime now, ActionList& actions) noexcept;
+  [[nodiscard]] std::optional<FreeRunningTime> sync_timeout() const noexcept;
   void send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept;
   void emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
   void check_for_jump(const EventPair& forward, FreeRunningTime now, ActionList& actions) noexcept;
   void forget_exchanges() noexcept;
-  void change_state(PortState to, PortEvent event, ActionList& actions) noexcept;
-  void push(const Action& action, ActionList& actions) noexcept;
+  [[nodiscard]] bool peer_to_peer() const noexcept {
+    return config_.delay_mechanism == DelayMechanism::kPeerToPeer;
+  }
 
   Config config_;
-  PortState state_ = PortState::kInitializing;
+  Port port_;
+  PeerDelay peer_delay_;
   ForeignTransmitters foreign_;
+  FastStart fast_start_;
   bool has_transmitter_ = false;
   bool had_transmitter_ = false;  ///< transmitter_ holds at least the last one
   TransmitterData transmitter_{};
@@ -127,8 +154,10 @@ class TimeReceiver {
   SyncMatcher matcher_;
   DelayRequests delay_requests_;
   LastPair last_forward_;
+  FreeRunningTime last_sync_{};  ///< of the followed transmitter, or when it was selected
+  bool has_information_ = false;
+  FollowUpInformation information_{};
   bool servo_locked_ = false;
-  Counters counters_;
 };
 
 }  // namespace ftcs::ptp

@@ -138,7 +138,8 @@ TEST_F(Receiver, a_request_without_answer_is_counted_and_asked_again) {
 TEST_F(Receiver, late_and_duplicate_delay_responses_are_dropped) {
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
-  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)));
   EXPECT_EQ(of<EmitPair>(general(delay_resp(id, 1s), 1s)).size(), 1U);
   EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
   const auto never_sent = static_cast<std::uint16_t>(id + 1);
@@ -149,10 +150,12 @@ TEST_F(Receiver, late_and_duplicate_delay_responses_are_dropped) {
 TEST_F(Receiver, a_missing_transmit_stamp_leaves_the_exchange_out) {
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
-  EXPECT_TRUE(receiver_.on_transmit_timestamp_missing(id, local(1s)).empty());
+  EXPECT_TRUE(
+      receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, id}, local(1s)).empty());
   EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
   EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
-  EXPECT_TRUE(receiver_.on_transmit_timestamp(id, local(1s), local(1s)).empty());
+  EXPECT_TRUE(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)).empty());
   EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
   EXPECT_TRUE(receiver_.deadline().has_value()) << "the next request comes as planned";
 }
@@ -184,7 +187,8 @@ TEST_F(Receiver, only_the_selected_transmitter_is_heard) {
 TEST_F(Receiver, responses_to_other_receivers_are_ignored) {
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
-  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)));
   EXPECT_TRUE(general(message_from(kA, id, DelayResp{reference(1s), kOther}), 1s).empty());
   EXPECT_EQ(count(Counter::kWrongRequestingPort), 1U);
   EXPECT_EQ(of<EmitPair>(general(delay_resp(id, 1s), 1s)).size(), 1U) << "ours is still open";
@@ -270,7 +274,8 @@ TEST_F(Receiver, small_negative_corrections_are_used_and_counted) {
 TEST_F(Receiver, the_fraction_of_a_stamp_in_a_delay_resp_is_no_negative_correction) {
   select_a();
   static_cast<void>(exchange(1, 1s));
-  static_cast<void>(receiver_.on_transmit_timestamp(0, local(1s), local(1s)));
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, 0}, local(1s), local(1s)));
   Message response = delay_resp(0, 1s + kDelay);
   response.header.correction = -Duration::from_ns(0.75);
   ASSERT_EQ(of<EmitPair>(general(response, 1s + 2 * kDelay)).size(), 1U);
@@ -302,7 +307,8 @@ TEST_F(Receiver, a_jump_of_the_reference_is_reported_and_open_requests_are_forgo
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
   static_cast<void>(general(follow_up(0, 1s), 1s));
-  static_cast<void>(receiver_.on_transmit_timestamp(id, local(1s), local(1s)));
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)));
   static_cast<void>(event(sync_from(kA, 1), 1125ms));
   const auto actions = general(follow_up(1, 2125ms), 1125ms);
   ASSERT_EQ(of<ReferenceJumped>(actions).size(), 1U);

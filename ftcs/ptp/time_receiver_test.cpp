@@ -105,7 +105,8 @@ TEST_F(Receiver, stamp_and_response_give_a_backward_pair_in_either_order) {
   const auto first = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
   Message response = delay_resp(first, 1s + kDelay);
   response.header.correction = Duration{40ns};
-  EXPECT_TRUE(receiver_.on_transmit_timestamp(first, local(1s), local(1s)).empty());
+  EXPECT_TRUE(receiver_.on_transmit_timestamp({MessageType::kDelayReq, first}, local(1s), local(1s))
+                  .empty());
   const auto pairs = of<EmitPair>(general(response, 1s + 2 * kDelay));
   ASSERT_EQ(pairs.size(), 1U);
   EXPECT_EQ(pairs[0].pair.direction, Direction::kBackward);
@@ -115,7 +116,10 @@ TEST_F(Receiver, stamp_and_response_give_a_backward_pair_in_either_order) {
   const auto due = *receiver_.deadline() + Duration{300ms};
   const auto second = of<SendMessage>(receiver_.on_timer(due))[0].sequence_id;
   EXPECT_TRUE(of<EmitPair>(general(delay_resp(second, 2s), 2s)).empty());
-  EXPECT_EQ(of<EmitPair>(receiver_.on_transmit_timestamp(second, local(2s), local(2s))).size(), 1U);
+  EXPECT_EQ(of<EmitPair>(receiver_.on_transmit_timestamp({MessageType::kDelayReq, second},
+                                                         local(2s), local(2s)))
+                .size(),
+            1U);
 }
 
 TEST_F(Receiver, delay_requests_are_spread_uniformly_over_twice_the_interval) {
@@ -208,7 +212,8 @@ TEST_F(UnicastReceiver, asks_its_peer_and_adds_the_asymmetry_to_both_directions)
   const auto forward = of<EmitPair>(general(in_domain(follow_up(0, 3s)), 3s + kDelay));
   ASSERT_EQ(forward.size(), 1U);
   EXPECT_EQ(forward[0].pair.reference, reference(3s) + Duration{500ns});
-  static_cast<void>(receiver_.on_transmit_timestamp(requests[0].sequence_id, local(3s), local(3s)));
+  static_cast<void>(receiver_.on_transmit_timestamp(
+      {MessageType::kDelayReq, requests[0].sequence_id}, local(3s), local(3s)));
   const auto backward =
       of<EmitPair>(general(in_domain(delay_resp(requests[0].sequence_id, 4s)), 4s));
   ASSERT_EQ(backward.size(), 1U);

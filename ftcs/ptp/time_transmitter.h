@@ -7,7 +7,8 @@
 #include <span>
 
 #include "ftcs/ptp/actions.h"
-#include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/peer_delay.h"
+#include "ftcs/ptp/port.h"
 
 namespace ftcs::ptp {
 
@@ -25,12 +26,17 @@ struct TimeTransmitterConfig {
   std::int16_t utc_offset = 37;
   std::uint16_t announce_flags = 0;  ///< flag::kPtpTimescale, kUtcOffsetValid, kTimeTraceable ...
   std::uint8_t time_source = 0xA0;   ///< 7.6.2.8; 0xA0 = internal oscillator
-  bool unicast =
-      false;  ///< Announce, Sync and Follow_Up to the one configured peer instead of multicast
+  bool unicast = false;              ///< everything to the one configured peer instead of multicast
+  DelayMechanism delay_mechanism = DelayMechanism::kEndToEnd;
+  /// With capability_needed nothing is announced or sent until the neighbour is capable.
+  PeerDelayConfig peer_delay{};
+  bool assume_two_step = false;  ///< of Pdelay_Resp, see PortConfig
+  bool follow_up_info = false;   ///< send the Follow_Up information TLV (802.1AS-2020, 11.4.4.3)
+  bool path_trace = false;       ///< send a PATH_TRACE TLV in Announce (16.2)
 };
 
 /// A grandmaster for the lab: it transmits whatever others announce. Two-step Sync, Announce,
-/// Delay_Resp.
+/// Delay_Resp or, peer to peer, both sides of the peer delay mechanism.
 ///
 /// Sans-I/O as TimeReceiver. Its clock *is* the reference: event stamps are ReferenceTime; `now`
 /// only drives timers and is read from the free-running clock. Messages to a receiver that asked by
@@ -47,11 +53,11 @@ class TimeTransmitter {
                                             ReferenceTime received, FreeRunningTime now) noexcept;
   [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
                                               FreeRunningTime now) noexcept;
-  /// When the Sync with this id left us: the Follow_Up is sent.
-  [[nodiscard]] ActionList on_transmit_timestamp(std::uint16_t sequence_id, ReferenceTime sent,
+  /// When the event message with this id left us: the Follow_Up is sent.
+  [[nodiscard]] ActionList on_transmit_timestamp(const EventId& id, ReferenceTime sent,
                                                  FreeRunningTime now) noexcept;
   /// No Follow_Up is sent.
-  [[nodiscard]] ActionList on_transmit_timestamp_missing(std::uint16_t sequence_id,
+  [[nodiscard]] ActionList on_transmit_timestamp_missing(const EventId& id,
                                                          FreeRunningTime now) noexcept;
   [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
   /// To FAULTY: nothing is sent.
@@ -60,8 +66,8 @@ class TimeTransmitter {
 
   /// When on_timer() must be called; none while nothing is to be sent.
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
-  [[nodiscard]] PortState state() const noexcept { return state_; }
-  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] PortState state() const noexcept { return port_.state(); }
+  [[nodiscard]] const Counters& counters() const noexcept { return port_.counters(); }
 
  private:
   /// A Sync whose transmit stamp is awaited.
@@ -72,29 +78,27 @@ class TimeTransmitter {
   /// Transmit stamps may lag behind by as many Syncs.
   static constexpr std::size_t kOpenSyncs = 4;
 
-  void handle(std::span<const std::uint8_t> bytes, std::optional<ReferenceTime> received,
-              ActionList& actions) noexcept;
-  [[nodiscard]] bool is_for_us(const Header& header) noexcept;
+  void dispatch(const Message& message, std::optional<ReferenceTime> received,
+                ActionList& actions) noexcept;
   void answer(const Header& request, ReferenceTime received, ActionList& actions) noexcept;
   void begin_transmitting(FreeRunningTime now, ActionList& actions) noexcept;
   void send_announce(ActionList& actions) noexcept;
   void send_sync(ActionList& actions) noexcept;
+  [[nodiscard]] bool peer_to_peer() const noexcept {
+    return config_.delay_mechanism == DelayMechanism::kPeerToPeer;
+  }
   [[nodiscard]] OpenSync* find(std::uint16_t sequence_id) noexcept;
-  [[nodiscard]] Header header(std::uint16_t sequence_id, std::int8_t log_interval) const noexcept;
-  bool send(const Message& message, Destination destination, ActionList& actions) noexcept;
-  void change_state(PortState to, PortEvent event, ActionList& actions) noexcept;
-  void push(const Action& action, ActionList& actions) noexcept;
 
   Config config_;
   Duration announce_interval_;
   Duration sync_interval_;
-  PortState state_ = PortState::kInitializing;
+  Port port_;
+  PeerDelay peer_delay_;
   FreeRunningTime next_announce_{};
   FreeRunningTime next_sync_{};
   std::uint16_t next_announce_id_ = 0;
   std::uint16_t next_sync_id_ = 0;
   std::array<OpenSync, kOpenSyncs> open_syncs_{};
-  Counters counters_;
 };
 
 }  // namespace ftcs::ptp

@@ -136,8 +136,8 @@ TEST_F(Transmitter, follow_up_carries_the_transmit_stamp_to_the_last_fraction) {
   EXPECT_TRUE(sync.message.header.has(flag::kTwoStep));
   EXPECT_EQ(sync.message.header.log_interval, -3);
   const auto stamp = reference(1s) + Duration::from_ns(0.75);
-  const auto follow =
-      sent(transmitter_.on_transmit_timestamp(sync.how.sequence_id, stamp, raw(1s)));
+  const auto follow = sent(transmitter_.on_transmit_timestamp(
+      {MessageType::kSync, sync.how.sequence_id}, stamp, raw(1s)));
   ASSERT_EQ(follow.size(), 1U);
   EXPECT_EQ(follow[0].how.channel, Channel::kGeneral);
   EXPECT_EQ(follow[0].message.header.sequence_id, sync.how.sequence_id);
@@ -147,9 +147,11 @@ TEST_F(Transmitter, follow_up_carries_the_transmit_stamp_to_the_last_fraction) {
 
 TEST_F(Transmitter, without_a_stamp_no_follow_up_is_sent) {
   const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
-  EXPECT_TRUE(transmitter_.on_transmit_timestamp_missing(id, raw(0s)).empty());
+  EXPECT_TRUE(
+      transmitter_.on_transmit_timestamp_missing({MessageType::kSync, id}, raw(0s)).empty());
   EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
-  EXPECT_TRUE(transmitter_.on_transmit_timestamp(id, reference(0s), raw(0s)).empty());
+  EXPECT_TRUE(
+      transmitter_.on_transmit_timestamp({MessageType::kSync, id}, reference(0s), raw(0s)).empty());
   EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
   EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
 }
@@ -162,7 +164,10 @@ TEST_F(Transmitter, a_stamp_that_never_comes_is_counted_when_its_place_is_needed
 
 TEST_F(Transmitter, a_stamp_before_the_epoch_is_not_sent) {
   const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
-  EXPECT_TRUE(transmitter_.on_transmit_timestamp(id, ReferenceTime::from_ns(-1), raw(0s)).empty());
+  EXPECT_TRUE(
+      transmitter_
+          .on_transmit_timestamp({MessageType::kSync, id}, ReferenceTime::from_ns(-1), raw(0s))
+          .empty());
   EXPECT_EQ(count(Counter::kUnusableTime), 1U);
   EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
   EXPECT_EQ(count(Counter::kActionsDropped), 0U);
@@ -205,8 +210,8 @@ class UnicastTransmitter : public Transmitter {
 
 TEST_F(UnicastTransmitter, sends_to_its_one_peer) {
   auto messages = sent(transmitter_.on_timer(raw(0s)));
-  const auto follow = sent(
-      transmitter_.on_transmit_timestamp(messages.at(1).how.sequence_id, reference(0s), raw(0s)));
+  const auto follow = sent(transmitter_.on_transmit_timestamp(
+      {MessageType::kSync, messages.at(1).how.sequence_id}, reference(0s), raw(0s)));
   messages.insert(messages.end(), follow.begin(), follow.end());
   ASSERT_EQ(messages.size(), 3U);
   for (const auto& one : messages) {
@@ -258,7 +263,8 @@ TEST_F(Transmitter, allocates_nothing) {
   {
     const test::ForbidAllocation guard;
     actions += transmitter_.on_timer(raw(0s)).size();
-    actions += transmitter_.on_transmit_timestamp(0, reference(0s), raw(0s)).size();
+    actions +=
+        transmitter_.on_transmit_timestamp({MessageType::kSync, 0}, reference(0s), raw(0s)).size();
     actions += transmitter_.on_event_message(request.view(), reference(0s), raw(0s)).size();
   }
   EXPECT_EQ(actions, 4U);

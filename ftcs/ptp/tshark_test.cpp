@@ -116,7 +116,7 @@ std::vector<MessageBytes> conversation(bool unicast, std::uint8_t minor_version)
   keep(receiver.start(now));
   const auto first = keep(transmitter.on_timer(now));
   for (int i = 0; i < 2; ++i) keep(receiver.on_general_message(first.at(0).bytes.view(), now));
-  keep(transmitter.on_transmit_timestamp(first.at(1).sequence_id, reference, now));
+  keep(transmitter.on_transmit_timestamp(first.at(1).id(), reference, now));
   const auto request = keep(receiver.on_event_message(first.at(1).bytes.view(), now, now));
   keep(transmitter.on_event_message(request.at(0).bytes.view(), reference, now));
   return all;

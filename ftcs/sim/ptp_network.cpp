@@ -28,7 +28,6 @@ struct Event {
   Port port = Port::kReceiver;
   std::size_t node = 0;
   ptp::Channel channel = ptp::Channel::kEvent;
-  std::uint16_t sequence_id = 0;
   TrueTime sent{};
   ptp::MessageBytes bytes{};
 };
@@ -143,7 +142,7 @@ class PtpRun {
       case EventKind::kTimer:
         return receiver.on_timer(now);
       case EventKind::kTransmitStamp:
-        return receiver.on_transmit_timestamp(event.sequence_id,
+        return receiver.on_transmit_timestamp(ptp::event_id(bytes),
                                               chain_.node(event.node).stamp(event.sent), now);
       case EventKind::kMessage:
         if (event.channel == ptp::Channel::kGeneral) return receiver.on_general_message(bytes, now);
@@ -164,7 +163,7 @@ class PtpRun {
         return transmitter.on_timer(now);
       case EventKind::kTransmitStamp:
         return transmitter.on_transmit_timestamp(
-            event.sequence_id, chain_.upstream_stamp(event.node, event.sent), now);
+            ptp::event_id(bytes), chain_.upstream_stamp(event.node, event.sent), now);
       case EventKind::kMessage:
         if (event.channel == ptp::Channel::kGeneral)
           return transmitter.on_general_message(bytes, now);
@@ -200,7 +199,6 @@ class PtpRun {
     if (message.channel != ptp::Channel::kEvent) return;
     event.kind = EventKind::kTransmitStamp;
     event.port = from.port;
-    event.sequence_id = message.sequence_id;
     event.sent = now_;
     queue_.schedule(now_ + kStampLatency, event);
   }

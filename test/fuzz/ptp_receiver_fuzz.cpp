@@ -58,10 +58,12 @@ class Script {
       case 3:
         return check(receiver_.on_servo_unlocked(now_));
       case 4:
-        return check(receiver_.on_transmit_timestamp_missing(octet(), now_));
+        return check(
+            receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, octet()}, now_));
       case 5:
       case 6:
-        return check(receiver_.on_transmit_timestamp(last_request_, stamp(), now_));
+        return check(receiver_.on_transmit_timestamp({MessageType::kDelayReq, last_request_},
+                                                     stamp(), now_));
       case 7:
         return raw_message();
       case 8:

@@ -42,9 +42,10 @@ inline constexpr std::size_t kMaximumMessageSize = 1472;
 /// inside are checked and skipped (14.1). The result never refers to the bytes.
 [[nodiscard]] Result<Message, DecodeError> decode(std::span<const std::uint8_t> bytes) noexcept;
 
-/// An encoded message; Announce, the longest one without TLVs, fits.
+/// An encoded message; Announce with a path trace of one and Follow_Up with its information, the
+/// longest ones, fit.
 struct MessageBytes {
-  std::array<std::uint8_t, 64> octets{};
+  std::array<std::uint8_t, 76> octets{};
   std::uint8_t size = 0;
   [[nodiscard]] constexpr std::span<const std::uint8_t> view() const noexcept {
     return {octets.data(), size};
@@ -59,5 +60,18 @@ enum class EncodeError : std::uint8_t {
 /// Message to bytes. A timestamp's fraction of a nanosecond is cut off: put it into the correction
 /// first.
 [[nodiscard]] Result<MessageBytes, EncodeError> encode(const Message& message) noexcept;
+
+/// Which event message a transmit stamp belongs to. Sequence ids are counted for each type, and for
+/// answers by the requester.
+struct EventId {
+  MessageType type = MessageType::kSync;
+  std::uint16_t sequence_id = 0;
+  PortIdentity requester{};  ///< of a Pdelay_Resp; else zero
+  friend constexpr bool operator==(const EventId&, const EventId&) noexcept = default;
+};
+
+/// The id of an event message that encode() wrote, read from its octets. Octets that are no message
+/// give an id that nobody waits for.
+[[nodiscard]] EventId event_id(std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace ftcs::ptp

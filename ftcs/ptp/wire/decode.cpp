@@ -56,6 +56,11 @@ class FieldReader {
   DecodeError error_;
 };
 
+/// IEEE 802.1AS-2020, 11.4.4.3: ORGANIZATION_EXTENSION with 802.1's identifier and subtype 1.
+constexpr std::uint16_t kOrganizationExtension = 0x0003;
+constexpr std::size_t kFollowUpInformationSize = 28;
+constexpr std::uint64_t kFollowUpInformationId = 0x0080C2'000001;
+
 std::optional<MessageType> known_type(std::uint8_t nibble) noexcept {
   if (nibble <= 0x3 || (nibble >= 0x8 && nibble <= 0xD)) return static_cast<MessageType>(nibble);
   return std::nullopt;
@@ -139,10 +144,40 @@ Body read_body(MessageType type, FieldReader& reader) noexcept {
   return Sync{};
 }
 
+/// ScaledNs, 802.1AS-2020, 6.4.3.1: 96 bits in units of 2^-16 ns. What a Duration cannot hold
+/// becomes the largest one that the encoder writes the same.
+Duration read_scaled_ns(ByteReader& reader) noexcept {
+  constexpr std::int64_t kLargest = std::int64_t{1} << 62;
+  const auto high = reader.read<std::int16_t>();
+  const auto ns = reader.read<std::int64_t>();
+  const auto fraction = reader.read<std::uint16_t>();
+  const bool fits = high == (ns < 0 ? -1 : 0) && ns < kLargest && ns >= -kLargest;
+  if (!fits) return Duration::from_whole_ns(high < 0 ? -kLargest : kLargest - 1);
+  return Duration::from_parts(ns, static_cast<std::uint32_t>(fraction) << 16);
+}
+
+/// If this TLV is the Follow_Up information, it is read. Of several the last one counts.
+void read_follow_up_information(std::span<const std::uint8_t> tlv, FollowUp& body) noexcept {
+  ByteReader reader(tlv);
+  const auto type = reader.read<std::uint16_t>();
+  if (type != kOrganizationExtension || tlv.size() != kTlvHeaderSize + kFollowUpInformationSize) {
+    return;
+  }
+  reader.skip(2);
+  if (reader.read<std::uint64_t, 6>() != kFollowUpInformationId) return;
+  body.has_information = true;
+  FollowUpInformation& information = body.information;
+  information.cumulative_scaled_rate_offset = reader.read<std::int32_t>();
+  information.gm_time_base_indicator = reader.read<std::uint16_t>();
+  information.last_gm_phase_change = read_scaled_ns(reader);
+  information.scaled_last_gm_freq_change = reader.read<std::int32_t>();
+}
+
 /// 14.1: each TLV has an even length and ends inside the message. Fewer than four octets at the end
 /// are no TLV; they are left alone, as padding of old transmitters.
-std::optional<DecodeError> check_tlvs(std::span<const std::uint8_t> message,
-                                      std::size_t offset) noexcept {
+std::optional<DecodeError> read_tlvs(std::span<const std::uint8_t> message, std::size_t offset,
+                                     Body& body) noexcept {
+  auto* const follow_up = std::get_if<FollowUp>(&body);
   while (message.size() - offset >= kTlvHeaderSize) {
     ByteReader reader(message.subspan(offset + 2, 2));
     const std::size_t length = reader.read<std::uint16_t>();
@@ -150,6 +185,9 @@ std::optional<DecodeError> check_tlvs(std::span<const std::uint8_t> message,
     if (length > room) return DecodeError{DecodeReason::kMalformedTlv, room, length, offset + 2};
     if (length % 2 != 0) {
       return DecodeError{DecodeReason::kMalformedTlv, length - 1, length, offset + 2};
+    }
+    if (follow_up != nullptr) {
+      read_follow_up_information(message.subspan(offset, kTlvHeaderSize + length), *follow_up);
     }
     offset += kTlvHeaderSize + length;
   }
@@ -198,8 +236,23 @@ Result<Message, DecodeError> decode(std::span<const std::uint8_t> bytes) noexcep
   const Header header = read_header(reader);
   Message message{header, read_body(frame->type, reader)};
   if (reader.failed()) return reader.error();
-  if (const auto error = check_tlvs(frame->message, size_of(frame->type))) return *error;
+  if (const auto error = read_tlvs(frame->message, size_of(frame->type), message.body)) {
+    return *error;
+  }
   return message;
+}
+
+EventId event_id(std::span<const std::uint8_t> bytes) noexcept {
+  constexpr std::size_t kSequenceId = 30;
+  constexpr std::size_t kRequestingPort = 44;
+  EventId id;
+  if (bytes.size() < kHeaderSize) return id;
+  id.type = static_cast<MessageType>(bytes[0] & 0xFU);
+  id.sequence_id = ByteReader(bytes.subspan(kSequenceId)).read<std::uint16_t>();
+  if (id.type == MessageType::kPdelayResp && bytes.size() >= size_of(id.type)) {
+    id.requester = FieldReader(bytes.subspan(kRequestingPort)).port_identity();
+  }
+  return id;
 }
 
 std::string_view to_string(DecodeReason reason) noexcept {

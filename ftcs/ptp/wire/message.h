@@ -76,7 +76,7 @@ struct ClockQuality {
   friend constexpr bool operator==(const ClockQuality&, const ClockQuality&) noexcept = default;
 };
 
-/// 13.5.1, Table 43.
+/// 13.5.1, Table 43. TLVs of what is received are skipped.
 struct Announce {
   ReferenceTime origin{};
   std::int16_t utc_offset = 0;  ///< TAI - UTC in seconds, 7.2.4; 37 since 2017
@@ -86,6 +86,8 @@ struct Announce {
   ClockIdentity grandmaster{};
   std::uint16_t steps_removed = 0;
   std::uint8_t time_source = 0xA0;  ///< 7.6.2.8; 0xA0 = internal oscillator
+  /// Sent with a PATH_TRACE TLV (16.2) that names the grandmaster alone, as IEEE 802.1AS wants.
+  bool path_trace = false;
   friend constexpr bool operator==(const Announce&, const Announce&) noexcept = default;
 };
 
@@ -99,9 +101,28 @@ struct DelayReq {
   ReferenceTime origin{};
   friend constexpr bool operator==(const DelayReq&, const DelayReq&) noexcept = default;
 };
+/// IEEE 802.1AS-2020, 11.4.4.3: the Follow_Up information TLV.
+struct FollowUpInformation {
+  /// (rate of the grandmaster in units of the sender's clock - 1) times 2^41.
+  std::int32_t cumulative_scaled_rate_offset = 0;
+  /// Changes with each jump of the grandmaster's time or frequency.
+  std::uint16_t gm_time_base_indicator = 0;
+  Duration last_gm_phase_change{};  ///< of the last jump: time after it minus time before it
+  std::int32_t scaled_last_gm_freq_change = 0;  ///< 2^-41
+  [[nodiscard]] constexpr double cumulative_rate_offset() const noexcept {
+    constexpr double kUnit = 1.0 / 2199023255552.0;  // 2^-41
+    return static_cast<double>(cumulative_scaled_rate_offset) * kUnit;
+  }
+  friend constexpr bool operator==(const FollowUpInformation&,
+                                   const FollowUpInformation&) noexcept = default;
+};
+
 /// 13.7.1, Table 45.
 struct FollowUp {
   ReferenceTime precise_origin{};
+  // Not std::optional: gcc 12 warns of uninitialised reads that cannot happen.
+  bool has_information = false;
+  FollowUpInformation information{};
   friend constexpr bool operator==(const FollowUp&, const FollowUp&) noexcept = default;
 };
 /// 13.8.1, Table 46.

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// What a time receiver does with each message; its inputs, states and timers are in
+// time_receiver.cpp.
+#include <variant>
+
+#include "ftcs/ptp/interval.h"
+#include "ftcs/ptp/time_receiver.h"
+
+namespace ftcs::ptp {
+namespace {
+
+/// 9.3.2.5: a data set that has come this far is worth nothing.
+constexpr std::uint16_t kMaximumStepsRemoved = 255;
+
+/// 11.3.2: every Delay_Resp takes the fraction of its stamp off the correction. That is no finding.
+constexpr Duration kUsualNegativeCorrection{Nanoseconds{-1}};
+
+}  // namespace
+
+/// Whether a message of time may come from there at all.
+bool TimeReceiver::usable_source(const Header& header) noexcept {
+  if (header.has(flag::kAlternateTransmitter)) {
+    port_.count(Counter::kAlternateTransmitter);
+  } else if (!config_.acceptable.accepts(header.source.clock)) {
+    port_.count(Counter::kUnacceptableTransmitter);
+  } else if (!peer_delay_.capable()) {
+    port_.count(Counter::kNotCapable);
+  } else {
+    return true;
+  }
+  return false;
+}
+
+void TimeReceiver::dispatch(const Message& message, const Input& input,
+                            ActionList& actions) noexcept {
+  const Header& header = message.header;
+  switch (type_of(message.body)) {
+    case MessageType::kAnnounce:
+      if (!usable_source(header)) return;
+      return on_announce(header, *std::get_if<Announce>(&message.body), input.now, actions);
+    case MessageType::kSync:
+      if (!input.received) return port_.count(Counter::kWrongChannel);
+      if (!from_transmitter(message, input.now)) return;
+      return on_sync(header, *std::get_if<Sync>(&message.body), input, actions);
+    case MessageType::kFollowUp:
+      if (!from_transmitter(message, input.now)) return;
+      return on_follow_up(header, *std::get_if<FollowUp>(&message.body), input.now, actions);
+    case MessageType::kDelayResp:
+      if (peer_to_peer()) return port_.count(Counter::kDelayIgnored);
+      if (!from_transmitter(message, input.now)) return;
+      return on_delay_resp(header, *std::get_if<DelayResp>(&message.body), input.now, actions);
+    case MessageType::kDelayReq:
+      return port_.count(Counter::kNotForThisRole);
+    case MessageType::kPdelayReq:
+    case MessageType::kPdelayResp:
+    case MessageType::kPdelayRespFollowUp:
+      return peer_delay_.on_message(message, input.received, port_, actions);
+    case MessageType::kSignaling:
+      return port_.count(Counter::kSignalingIgnored);
+    case MessageType::kManagement:
+      return port_.count(Counter::kManagementIgnored);
+  }
+}
+
+/// Whether the message comes from the selected transmitter or, while there is none, from the
+/// candidate of a fast start.
+bool TimeReceiver::from_transmitter(const Message& message, FreeRunningTime now) noexcept {
+  if (!usable_source(message.header)) return false;
+  const PortIdentity& source = message.header.source;
+  if (has_transmitter_) {
+    if (source == transmitter_.port) return true;
+    port_.count(Counter::kWrongTransmitter);
+    return false;
+  }
+  if (config_.fast_start && std::holds_alternative<Sync>(message.body)) {
+    const auto admission = fast_start_.admit_sync(source, now);
+    if (admission.changed) forget_exchanges();
+    if (admission.admitted) return true;
+  } else if (fast_start_.is_candidate(source)) {
+    return true;
+  }
+  port_.count(Counter::kNotListening);
+  return false;
+}
+
+bool TimeReceiver::usable_correction(const Header& header) noexcept {
+  if (abs(header.correction) > Duration{kMaximumCorrection}) {
+    port_.count(Counter::kAbsurdCorrection);
+    return false;
+  }
+  if (header.correction < kUsualNegativeCorrection) port_.count(Counter::kNegativeCorrection);
+  return true;
+}
+
+void TimeReceiver::on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
+                               ActionList& actions) noexcept {
+  if (announce.steps_removed >= kMaximumStepsRemoved || header.source.clock == config_.port.clock ||
+      announce.grandmaster == config_.port.clock) {
+    port_.count(Counter::kUnusableAnnounce);
+    return;
+  }
+  port_.count(Counter::kAnnounceReceived);
+  auto interval = interval_from_log(header.log_interval);
+  if (!interval) {
+    if (header.log_interval != kNoLogInterval) port_.count(Counter::kBadInterval);
+    interval = interval_from_log(config_.log_announce_interval);
+  }
+  TransmitterData data{header.source, announce, header.flags};
+  data.announce.origin = {};  // differs in each message and says nothing about the transmitter
+  const auto heard = foreign_.hear(data, interval.value_or(Duration{std::chrono::seconds{1}}), now,
+                                   has_transmitter_ ? transmitter_.port : PortIdentity{});
+  if (heard == ForeignTransmitters::Heard::kTableFull) port_.count(Counter::kForeignTableFull);
+  if (heard == ForeignTransmitters::Heard::kNew)
+    port_.push(TransmitterSeen{header.source}, actions);
+  decide(now, actions);
+}
+
+void TimeReceiver::on_sync(const Header& header, const Sync& sync, const Input& input,
+                           ActionList& actions) noexcept {
+  if (!usable_correction(header)) return;
+  port_.count(Counter::kSyncReceived);
+  last_sync_ = input.now;
+  if (const auto interval = interval_from_log(header.log_interval)) sync_interval_ = interval;
+  if (config_.hybrid) port_.push(SenderIsTransmitter{}, actions);
+  emit(matcher_.on_sync(header, sync, *input.received, input.now, port_.counters()), input.now,
+       actions);
+  if (peer_to_peer()) return;
+  if (!delay_requests_.running()) delay_requests_.start(input.now);
+  send_delay_req_if_due(input.now, actions);
+}
+
+void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
+                                FreeRunningTime now, ActionList& actions) noexcept {
+  if (!usable_correction(header)) return;
+  port_.count(Counter::kFollowUpReceived);
+  follow_information(follow_up, actions);
+  emit(matcher_.on_follow_up(header, follow_up, now, port_.counters()), now, actions);
+}
+
+/// 802.1AS-2020, 11.4.4.3: how fast the grandmaster is, by the sender's clock, by which the peer
+/// delay was measured; and that its time base changed, however small the jump.
+void TimeReceiver::follow_information(const FollowUp& follow_up, ActionList& actions) noexcept {
+  if (!follow_up.has_information) return;
+  const bool changed = has_information_ && information_.gm_time_base_indicator !=
+                                               follow_up.information.gm_time_base_indicator;
+  has_information_ = true;
+  information_ = follow_up.information;
+  peer_delay_.set_reference_rate(Rate::from_ratio(1.0 + information_.cumulative_rate_offset()));
+  if (!changed || !has_transmitter_) return;
+  port_.count(Counter::kReferenceJumps);
+  last_forward_ = LastPair{};  // the jump is known: it need not be found again
+  port_.push(ReferenceJumped{information_.last_gm_phase_change}, actions);
+}
+
+void TimeReceiver::on_delay_resp(const Header& header, const DelayResp& response,
+                                 FreeRunningTime now, ActionList& actions) noexcept {
+  if (response.requesting_port != config_.port) return port_.count(Counter::kWrongRequestingPort);
+  if (!usable_correction(header)) return;
+  port_.count(Counter::kDelayRespReceived);
+  delay_requests_.honour(header.log_interval, now, port_.counters());
+  emit(delay_requests_.on_response(header, response, port_.counters()), now, actions);
+}
+
+}  // namespace ftcs::ptp
