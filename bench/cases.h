@@ -80,7 +80,7 @@ struct LawCase {
 /// One forward message through gate, path delay and control law.
 struct TwoWayCase {
   World world{};
-  AnyServo servo = make_servo({});
+  AnyServo servo = make_servo({.kind = ServoKind::kFtcs});
   ServoUpdate step() noexcept {
     world.next();
     const EventPair pair = world.backward();
@@ -100,7 +100,7 @@ struct BenchSource final : FreeRunningSource {
 struct DisciplineCase {
   BenchSource source{};
   VirtualClock clock{source, {.free_running = {}, .local = {}, .rate = {}, .limits = {}}};
-  ClockDiscipline discipline{DisciplineConfig{}, clock};
+  ClockDiscipline discipline{DisciplineConfig{.servo = {.kind = ServoKind::kFtcs}}, clock};
   Telemetry step() noexcept {
     source.world.next();
     (void)discipline.on_pair(source.world.forward());

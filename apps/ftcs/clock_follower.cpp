@@ -36,6 +36,7 @@ DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stam
   config.servo.linuxptp_pi.step_threshold = options.step_threshold;
   config.servo.linuxptp_pi.timestamping =
       hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
+  config.servo.adaptive.steering.first_step_allowed = options.first_step;
   config.step = step_policy(options);
   config.largest_first_offset = kLargestFirstOffset;
   return config;

@@ -23,7 +23,7 @@ Duration sync_interval(const DemoOptions& demo) {
 std::vector<ServoConfig> demo_servos(const DemoOptions& demo, Nanoseconds interval) {
   std::vector<ServoConfig> servos;
   for (const ServoKind kind :
-       {ServoKind::kFtcs, ServoKind::kAdaptive, ServoKind::kPics, ServoKind::kLinuxptpPi}) {
+       {ServoKind::kAdaptive, ServoKind::kFtcs, ServoKind::kPics, ServoKind::kLinuxptpPi}) {
     ServoConfig config;
     config.kind = kind;
     config.sync_interval = interval;

@@ -86,7 +86,7 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
 
 void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
   Flags flags(command);
-  flags.value("--servo", arguments.servo, "NAME", servo_names() + "; default ftcs");
+  flags.value("--servo", arguments.servo, "NAME", servo_names() + "; default adaptive");
   flags.value("--offset-gain", arguments.offset_gain, "P",
               "ftcs: p inside the band, 0 to 1; default 1/16");
   flags.value("--converged-band", arguments.converged_band, "BAND",

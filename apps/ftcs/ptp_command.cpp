@@ -26,6 +26,15 @@ Wrong set_duration(const std::string& text, const char* flag, Duration& target) 
   return std::nullopt;
 }
 
+/// The first flag given that only the paper's servo has.
+std::optional<std::string> ftcs_flag(const PtpArguments& arguments) {
+  if (arguments.offset_gain) return "--offset-gain";
+  if (!arguments.correction_time.empty()) return "--correction-time";
+  if (arguments.converged_dwell) return "--converged-dwell";
+  if (!arguments.converged_band.empty()) return "--converged-band";
+  return std::nullopt;
+}
+
 Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   ServoConfig& servo = options.servo;
   if (!arguments.servo.empty()) {
@@ -36,6 +45,10 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
     servo.kind = *kind;
   }
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
+  if (const auto flag = ftcs_flag(arguments); flag && servo.kind != ServoKind::kFtcs) {
+    return fmt::format("{} is of the servo ftcs, this one is {}: add --servo ftcs", *flag,
+                       servo_kind_name(servo.kind));
+  }
   if (arguments.offset_gain) servo.ftcs.offset_gain = *arguments.offset_gain;
   Duration correction_time{servo.ftcs.correction_time};
   if (auto wrong = set_duration(arguments.correction_time, "--correction-time", correction_time)) {

@@ -59,7 +59,7 @@ inline constexpr ServoKindName kServoKinds[] = {
 /// hands them to the law that is chosen (the interval unless it is zero; the limits narrowed by the
 /// law's own).
 struct ServoConfig {
-  ServoKind kind = ServoKind::kFtcs;
+  ServoKind kind = ServoKind::kAdaptive;
   Nanoseconds sync_interval{0};
   RateLimits limits{};
   TwoWayConfig two_way{};

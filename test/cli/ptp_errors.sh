@@ -39,8 +39,9 @@ expect 2 "UDP/IPv6 is not supported" ptp -i lo -6
 expect 2 "hardware clock is not supported" ptp -i lo -p /dev/ptp0
 expect 2 "only virtual" ptp -i lo --clock realtime
 expect 2 "unknown servo 'magic'" ptp -i lo --servo magic
-expect 2 "offset gain must lie between 0 and 1" ptp -i lo --offset-gain 2
-expect 2 "is no band" ptp -i lo --converged-band 5us:1us
+expect 2 "offset gain must lie between 0 and 1" ptp -i lo --servo ftcs --offset-gain 2
+expect 2 "is no band" ptp -i lo --servo ftcs --converged-band 5us:1us
+expect 2 "--offset-gain is of the servo ftcs, this one is adaptive: add --servo ftcs" ptp -i lo --offset-gain 0.5
 expect 2 "'1' is no time" ptp -i lo --offset 1
 expect 2 "'50' is no rate" ptp -i lo --skew 50
 expect 2 "greater than zero" ptp -i lo --max-frequency -1ppm
