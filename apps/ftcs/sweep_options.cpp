@@ -16,6 +16,7 @@
 #include "apps/ftcs/progress.h"
 #include "ftcs/experiment/toml_table.h"
 #include "ftcs/report/sweep_report.h"
+#include "ftcs/report/trace_plots.h"
 
 namespace ftcs::app {
 namespace {
@@ -85,7 +86,8 @@ void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
   }
 }
 
-/// The first seed of a single scenario, drawn; a suite has too many lines for one picture.
+/// The first seed of a single scenario, sample by sample; a suite has too many lines for one
+/// picture.
 std::vector<experiment::RunTrace> traces_of(const std::vector<Scenario>& scenarios) {
   std::vector<experiment::RunTrace> traces;
   if (scenarios.size() != 1) return traces;
@@ -113,12 +115,18 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
   command.add_option("--json", options.json, "write all figures to this file; - = standard output");
   command.add_option("--csv", options.csv, "write the table to this file");
   command.add_option("--html", options.html, "write a report to this file");
+  command.add_option("--trace", options.trace,
+                     "write every sample of the first seed to this file (CSV; one scenario only)");
   command.add_flag("-q,--quiet", options.quiet, "print nothing to the console");
 }
 
 int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
                    const SweepOptions& options) {
   apply(options, scenarios);
+  if (!options.trace.empty() && scenarios.size() != 1) {
+    throw std::runtime_error(
+        fmt::format("--trace follows one scenario, {} were given", scenarios.size()));
+  }
   const experiment::Shard shard = parse_shard(options.shard);
   const Interrupt interrupt;
   SweepResult sweep;
@@ -141,8 +149,12 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
   bool written =
       options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));
   written &= options.csv.empty() || write_result(options.csv, suite_table(sweep).to_csv());
-  written &= options.html.empty() ||
-             write_result(options.html, sweep_html(sweep, origin, traces_of(scenarios)));
+  if (!options.html.empty() || !options.trace.empty()) {
+    const auto traces = traces_of(scenarios);
+    written &=
+        options.html.empty() || write_result(options.html, sweep_html(sweep, origin, traces));
+    written &= options.trace.empty() || write_result(options.trace, trace_csv(traces));
+  }
   const bool judged = shard.count == 1;
   return written && !interrupt.flag() && (!judged || sweep.passed()) ? kSuccess : kRuntimeError;
 }

@@ -25,6 +25,7 @@ struct SweepOptions {
   std::string json;
   std::string csv;
   std::string html;
+  std::string trace;  ///< sample by sample, the first seed of a single scenario
   bool quiet = false;
 };
 

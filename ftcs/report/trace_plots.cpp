@@ -8,6 +8,7 @@
 
 #include "ftcs/analysis/mtie.h"
 #include "ftcs/analysis/stability.h"
+#include "ftcs/report/table.h"
 
 namespace ftcs {
 namespace {
@@ -132,6 +133,18 @@ std::vector<Plot> trace_plots(const std::vector<RunTrace>& traces) {
     plots.push_back(wander);
   }
   return plots;
+}
+
+std::string trace_csv(const std::vector<RunTrace>& traces) {
+  std::string text = "servo,time_s,time_error_ns,rate_error_ppb\n";
+  for (const RunTrace& trace : traces) {
+    const std::string servo = csv_field(trace.servo);
+    for (std::size_t i = 0; i < trace.time_s.size(); ++i) {
+      text += servo + ',' + csv_number(trace.time_s[i]) + ',' + csv_number(trace.time_error_ns[i]) +
+              ',' + csv_number(trace.rate_error_ppb[i]) + '\n';
+    }
+  }
+  return text;
 }
 
 }  // namespace ftcs

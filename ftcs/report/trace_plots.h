@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "ftcs/experiment/scenario_run.h"
@@ -12,5 +13,9 @@ namespace ftcs {
 /// error over the measurement window, the distribution of |time error|, TDEV and MTIE of the
 /// window.
 [[nodiscard]] std::vector<Plot> trace_plots(const std::vector<experiment::RunTrace>& traces);
+
+/// The same runs for other programs: servo,time_s,time_error_ns,rate_error_ppb, a row for each
+/// sample, one servo after the other.
+[[nodiscard]] std::string trace_csv(const std::vector<experiment::RunTrace>& traces);
 
 }  // namespace ftcs

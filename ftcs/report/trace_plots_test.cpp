@@ -2,6 +2,7 @@
 // World: two traces made by hand, ten samples a cycle, a window from cycle 5 on.
 #include "ftcs/report/trace_plots.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -59,6 +60,17 @@ TEST(TracePlots, irregular_times_have_no_tau) {
   for (std::size_t i = 0; i < irregular.time_s.size(); i += 3) irregular.time_s[i] += 0.05;
   EXPECT_EQ(trace_plots({irregular}).size(), 4U);
   EXPECT_TRUE(trace_plots({}).empty());
+}
+
+TEST(TracePlots, csv_has_a_row_for_each_sample_of_each_servo) {
+  auto first = trace("a", 10.0);
+  first.time_s.resize(2);
+  const std::string csv = trace_csv({first, trace("b,c", 300.0)});
+  EXPECT_TRUE(
+      csv.starts_with("servo,time_s,time_error_ns,rate_error_ppb\na,0,1000000,0\na,0.2,1000000,"
+                      "1\n\"b,c\",0,1000000,0\n"))
+      << csv.substr(0, 200);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 + 1000);
 }
 
 }  // namespace

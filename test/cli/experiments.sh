@@ -52,6 +52,7 @@ expect 2 'a scenario needs a [run] table' simulate empty.toml
 expect 2 'none.toml: cannot be read' simulate none.toml
 expect 1 'no scenario files' compare --suite none
 expect 1 '--shard needs i/n' simulate good.toml --shard 3/2
+expect 1 '--trace follows one scenario' simulate good.toml good.toml --trace t.csv
 expect 1 'not a result of --shard' simulate good.toml --merge good.toml
 expect 1 'none.log' compare --log none.log
 expect 1 'empty.toml: no line of a known format' compare --log empty.toml
