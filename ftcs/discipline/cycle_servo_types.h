@@ -27,8 +27,11 @@ struct CycleServoConfig {
   Nanoseconds resolution{1};  ///< of the timer; 10 us is the paper's; above zero
   /// FTCS and PICS take one sample in so many cycles (the paper's T_sync); the adaptive servo all.
   std::uint32_t cycles_per_sync = 500;
-  double offset_gain = 1.0 / 16.0;                               ///< FTCS: p inside the band
-  ConvergedBand band{Nanoseconds{20'000}, Nanoseconds{20'000}};  ///< FTCS: B
+  double offset_gain = 1.0 / 16.0;  ///< FTCS: p inside the band
+  /// FTCS: B. The paper's 20 us are two ticks of its timer. Here the tick is known and the stamps
+  /// scatter by less than 1 us: whatever is further off than 5 us is no noise, and eq. 18 removes
+  /// in one interval what p inside the band would trickle away.
+  ConvergedBand band{Nanoseconds{5'000}, Nanoseconds{5'000}};
   std::uint32_t converged_dwell = 1;
   /// PICS: k_p and k_i of eq. 26 times the cycles per interval. 1 and 1 is deadbeat.
   double proportional_gain = 1.0;

@@ -7,6 +7,7 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/ethercat/cycle_laws.h"
 #include "apps/ftcs/ethercat/main_runner.h"
+#include "apps/ftcs/ethercat/run_html.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/report/write_file.h"
@@ -23,7 +24,7 @@ struct EthercatArguments {
   std::string sync_interval = "500ms";
   std::string shift = "0";
   std::string resolution = "1ns";
-  std::string band = "20us";
+  std::string band = "5us";
   std::string transit = "0";
   std::string gate = "200us";
   std::string lock = "5us";
@@ -128,6 +129,7 @@ int run_main(EthercatArguments arguments) {
     fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
     return kUsageError;
   }
+  arguments.options.trace = !arguments.options.html.empty();
   const RunOptions& options = arguments.options;
   auto link = open_link(options);
   if (!link) {
@@ -147,6 +149,15 @@ int run_main(EthercatArguments arguments) {
   if (!options.quiet) print_run(*runner);
   if (!options.json.empty()) {
     if (const auto error = write_file(options.json, dump(run_json(*runner)))) {
+      fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
+      return kRuntimeError;
+    }
+  }
+  if (!options.html.empty()) {
+    const MainRunner* const runs[] = {runner.get()};
+    HtmlReport report("EtherCAT: a cycle that follows the distributed clock", options.servo_name);
+    add_run_sections(report, runs);
+    if (const auto error = write_file(options.html, report.render())) {
       fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
       return kRuntimeError;
     }
@@ -176,7 +187,7 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
                      "ftcs and pics act once in this time; default 500ms");
   command.add_option("--offset-gain", options.servo.offset_gain, "ftcs: p inside the band")
       ->check(CLI::Range(0.0, 1.0));
-  command.add_option("--converged-band", arguments.band, "ftcs: B; default 20us");
+  command.add_option("--converged-band", arguments.band, "ftcs: B; default 5us");
   command.add_option("--gains", arguments.gains, "pics: k_p,k_i times the cycles per interval")
       ->delimiter(',');
   command.add_option("--shift", arguments.shift, "frames leave so long after whole cycles");
@@ -196,10 +207,19 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
       ->check(CLI::Range(0, 99));
   command.add_option("--cpu", options.cpu, "pin to this processor");
   command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+  command
+      .add_option("--sync-error-limit", options.sync_error_limit,
+                  "0x10F1:02 of the drives: a missed SYNC0 window counts 3; default 17, 0 never")
+      ->check(CLI::Range(0, 0xFFFF));
+  command
+      .add_option("--ride-through", options.ride_through_s,
+                  "seconds in which drives may be out of reach before the rest is stopped")
+      ->check(CLI::Range(0.0, 1e6));
   command.add_flag("!--no-motion", options.move, "leave the axes disabled");
   command.add_flag("-q,--quiet", options.quiet, "no live lines");
   command.add_option("--json", options.json, "write the figures to this file");
   command.add_option("--csv", options.csv, "write each cycle to this file");
+  command.add_option("--html", options.html, "write a report with plots to this file");
 }
 
 }  // namespace

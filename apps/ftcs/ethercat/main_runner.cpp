@@ -43,18 +43,18 @@ ethercat::MainDeviceConfig make_config(const RunOptions& options, bool scan_only
   const auto cycle = static_cast<double>(options.servo.cycle.count());
   config.process.sync0_shift =
       options.servo.shift + Nanoseconds{static_cast<std::int64_t>(options.sync0_phase * cycle)};
+  const double ride_through = options.ride_through_s * 1e9 / cycle;
+  config.absence_limit = std::max(config.absence_limit, static_cast<std::uint32_t>(ride_through));
   return config;
 }
 
 }  // namespace
 
 MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
-    : options_(options), link_(std::move(link)) {
+    : options_(options), link_(std::move(link)), path_(kRadius, kTurn_s) {
   const auto objects = ethercat::csp_objects(options.servo.cycle);
   objects_.assign(objects.begin(), objects.end());
-  // Lost frames of a shared line shall not fault the drives: six misses in a row do (3 each).
-  constexpr std::uint32_t kSyncErrorLimit = 17;
-  objects_.push_back({{0x10F1, 2}, 2, kSyncErrorLimit, false});
+  objects_.push_back({{0x10F1, 2}, 2, options.sync_error_limit, false});
   servo_ = std::make_unique<CycleServo>(options.servo);
   if (!options.csv.empty()) csv_.reset(std::fopen(options.csv.c_str(), "w"));
   if (csv_) {
@@ -105,6 +105,8 @@ bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
 
 /// Before the first cycle: nothing is allocated later.
 void MainRunner::reserve_trace() {
+  constexpr std::size_t kMostEvents = 1000;
+  figures_.events.reserve(kMostEvents);
   constexpr double kMostPoints = 500'000.0;
   const double cycle_s = static_cast<double>(options_.servo.cycle.count()) * 1e-9;
   const double cycles = options_.duration_s / cycle_s + 1000.0;
@@ -116,6 +118,8 @@ void MainRunner::reserve_trace() {
 void MainRunner::run(const std::function<bool()>& stop) {
   axes_.resize(main_->network().count);
   reserve_trace();
+  seen_.assign(main_->network().count, Seen::kNotYet);
+  reintegrating_ = main_->network().count;
   start_ = HostClock::now();
   next_line_ = start_ + Duration{kLineInterval};
   decision_ = servo_->start(start_);
@@ -138,12 +142,19 @@ void MainRunner::cycle() {
   const auto limit =
       static_cast<std::int64_t>(kReplyShare * static_cast<double>(options_.servo.cycle.count()));
   CycleSample sample;
+  if (decision_.state != CycleState::kWaiting) {
+    const LocalTime now = servo_->local_at(HostClock::now());
+    main_->set_reference_estimate(
+        ReferenceTime{now.since_epoch() + Duration{options_.servo.transit}});
+  }
   const bool answered = exchange(HostClock::now() + Duration::from_whole_ns(limit), &sample);
   const ethercat::CycleReport& report = main_->last_cycle();
   sample.has_reference = answered && report.has_reference;
   sample.reference = report.reference;
   decision_ = servo_->update(sample, HostClock::now());
   note(sample, answered);
+  watch_lock();
+  watch_drives();
   supervise();
   if (csv_) write_csv(sample);
   if (HostClock::now() >= next_line_) {
@@ -157,26 +168,22 @@ void MainRunner::cycle() {
 void MainRunner::move_axes() {
   const bool moving = figures_.op_cycle >= 0 && options_.move;
   const double time = servo_->next_trigger().local.since_epoch().seconds();
-  const double angle = 2.0 * std::numbers::pi * std::fmod(time, kTurn_s) / kTurn_s;
   const bool all_enabled = std::all_of(
       axes_.begin(), axes_.end(),
       [](const ethercat::CspAxis& axis) { return axis.state() == ethercat::AxisState::kEnabled; });
-  if (!all_enabled) moving_since_ = figures_.cycles;
-  // The radius grows from zero, so that nobody jumps.
-  const double grown =
-      static_cast<double>(figures_.cycles - moving_since_) / static_cast<double>(1000);
-  const double radius = kRadius * std::min(1.0, grown);
+  path_.advance(moving && all_enabled);
   for (std::size_t n = 0; n < axes_.size(); ++n) {
     const auto outputs = main_->outputs(n);
     const auto inputs = main_->inputs(n);
     if (outputs.size() < ethercat::csp::kOutputSize) continue;
     if (inputs.size() < ethercat::csp::kInputSize) continue;
-    const double offset = radius * (n % 2 == 0 ? std::cos(angle) : std::sin(angle));
+    if (!main_->takes_part(n)) axes_[n].restart();
+    const bool enabled = axes_[n].state() == ethercat::AxisState::kEnabled;
     axes_[n]
         .cycle(ethercat::csp::Inputs::decode(inputs),
-               {.enable = moving,
+               {.enable = moving && (enabled || path_.at_rest()),
                 .reset_fault = figures_.cycles % 2 == 0,
-                .displacement = static_cast<std::int32_t>(std::lround(offset))})
+                .displacement = path_.displacement(n, time)})
         .encode(outputs);
   }
 }
@@ -212,7 +219,8 @@ void MainRunner::note(const CycleSample& sample, bool answered) {
   figures_.round_trip.add((sample.received - sample.sent).ns());
   figures_.margin.add(static_cast<double>(margin_ns(sample)));
   const auto second = 1'000'000'000 / options_.servo.cycle.count();
-  if (static_cast<std::int64_t>(figures_.cycles) > figures_.lock_cycle + second) {
+  const bool settled = static_cast<std::int64_t>(figures_.cycles) > figures_.lock_cycle + second;
+  if (settled && main_->complete() && main_->last_cycle().inputs_valid) {
     figures_.worst_difference_ns =
         std::max(figures_.worst_difference_ns, main_->last_cycle().difference_bound_ns);
   }
@@ -245,6 +253,53 @@ void MainRunner::supervise() {
   const std::uint64_t since = figures_.cycles - asked_at_;
   if (since < kCyclesBetweenRequests || since % kCyclesBetweenRecoveries != 0) return;
   for (std::size_t n = 0; n < main_->network().count; ++n) main_->recover(n);
+}
+
+void MainRunner::record(RunEvent::Kind kind, std::size_t drive, ethercat::AlStatusCode code) {
+  if (figures_.events.size() == figures_.events.capacity()) return;
+  const double time_s = (HostClock::now() - start_).seconds();
+  figures_.events.push_back({time_s, kind, static_cast<std::uint16_t>(drive), code});
+}
+
+void MainRunner::watch_lock() {
+  const bool locked = decision_.state == CycleState::kLocked;
+  if (locked == was_locked_) return;
+  was_locked_ = locked;
+  record(locked ? RunEvent::Kind::kLocked : RunEvent::Kind::kLockLost);
+  if (!locked) {
+    ++figures_.lock_losses;
+    lost_lock_at_ = figures_.cycles;
+  } else if (lost_lock_at_ != 0) {
+    figures_.longest_relock = std::max(figures_.longest_relock,
+                                       static_cast<std::int64_t>(figures_.cycles - lost_lock_at_));
+  }
+}
+
+/// From OP on: who leaves it, and why; who comes back.
+void MainRunner::watch_drives() {
+  if (figures_.op_cycle < 0) return;
+  if (main_->counters().reintegrated != reintegrated_) {
+    reintegrated_ = main_->counters().reintegrated;
+    record(RunEvent::Kind::kReintegrated, reintegrating_);
+  }
+  reintegrating_ = main_->reintegrating();
+  for (std::size_t n = 0; n < seen_.size(); ++n) {
+    const ethercat::SubDeviceInfo& device = main_->network().devices[n];
+    const Seen now = device.state == AlState::kOp     ? Seen::kInOp
+                     : device.state == AlState::kNone ? Seen::kOutOfReach
+                                                      : Seen::kLeftOp;
+    // On its way back a drive passes the lower states.
+    const bool on_its_way = now == Seen::kLeftOp && seen_[n] == Seen::kOutOfReach && !device.error;
+    if (now == seen_[n] || on_its_way) continue;
+    const bool first = seen_[n] == Seen::kNotYet;
+    if (first && now != Seen::kInOp) continue;  // not yet asked
+    seen_[n] = now;
+    if (first) continue;
+    record(now == Seen::kInOp         ? RunEvent::Kind::kBackInOp
+           : now == Seen::kOutOfReach ? RunEvent::Kind::kOutOfReach
+                                      : RunEvent::Kind::kLeftOp,
+           n, device.code);
+  }
 }
 
 void MainRunner::print_live() const {

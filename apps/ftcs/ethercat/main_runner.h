@@ -10,6 +10,7 @@
 
 #include "ftcs/analysis/quantile_sketch.h"
 #include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/ethercat/maindevice/circle_path.h"
 #include "ftcs/ethercat/maindevice/csp_axis.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
 #include "ftcs/platform/ethercat_link.h"
@@ -30,6 +31,11 @@ struct RunOptions {
   Nanoseconds spin{0};
   int priority = 80;
   int cpu = -1;
+  /// 0x10F1:02: a missed SYNC0 window counts three, a good one takes one off. Lost frames of a
+  /// shared line shall not fault the drives: six misses in a row do.
+  std::uint32_t sync_error_limit = 17;
+  /// So long fewer drives than scanned may answer before the rest is stopped.
+  double ride_through_s = 0.0;
   bool move = true;  ///< the axes draw circles, two by two
   bool quiet = false;
   bool trace = false;  ///< keep a point for each cycle: plots
@@ -47,6 +53,23 @@ struct RunPoint {
   float margin_us = 0.0F;
 };
 
+/// Something that happened while the drives ran.
+struct RunEvent {
+  enum class Kind : std::uint8_t {
+    kLocked,
+    kLockLost,
+    kLeftOp,        ///< with its AL status code
+    kOutOfReach,    ///< does not answer to its address
+    kReintegrated,  ///< was restarted, has its configuration back
+    kBackInOp,
+  };
+  static constexpr std::uint16_t kNobody = 0xFFFF;
+  double time_s = 0.0;
+  Kind kind = Kind::kLocked;
+  std::uint16_t drive = kNobody;
+  ethercat::AlStatusCode code = ethercat::AlStatusCode::kNoError;
+};
+
 /// What a run showed. Times in ns.
 struct RunFigures {
   std::uint64_t cycles = 0;
@@ -56,6 +79,8 @@ struct RunFigures {
   std::uint64_t host_stalls = 0;  ///< cycles passed over
   std::int64_t lock_cycle = -1;
   std::int64_t op_cycle = -1;
+  std::uint64_t lock_losses = 0;
+  std::int64_t longest_relock = 0;        ///< cycles from the loss of a lock to the next one
   std::uint32_t worst_difference_ns = 0;  ///< bound of |0x092C|, from one second after the lock on
   QuantileSketch lateness;
   QuantileSketch phase;
@@ -65,6 +90,7 @@ struct RunFigures {
   QuantileSketch round_trip;
   QuantileSketch margin;  ///< SYNC0 minus arrival
   std::vector<RunPoint> trace;
+  std::vector<RunEvent> events;  ///< the first thousand
 };
 
 /// Drives a MainDevice and a cycle servo over a link: bring-up, cyclic exchange, motion, report.
@@ -92,6 +118,10 @@ class MainRunner {
   void note(const CycleSample& sample, bool answered);
   void trace(const CycleSample& sample);
   void supervise();
+  void watch_lock();
+  void watch_drives();
+  void record(RunEvent::Kind kind, std::size_t drive = RunEvent::kNobody,
+              ethercat::AlStatusCode code = ethercat::AlStatusCode::kNoError);
   void print_live() const;
   void write_csv(const CycleSample& sample);
   [[nodiscard]] std::int64_t margin_ns(const CycleSample& sample) const;
@@ -102,16 +132,24 @@ class MainRunner {
   std::unique_ptr<CycleServo> servo_;
   std::vector<ethercat::SdoDownload> objects_;
   std::vector<ethercat::CspAxis> axes_;
+  ethercat::CirclePath path_;
+  /// What was last recorded of a drive.
+  enum class Seen : std::uint8_t { kNotYet, kInOp, kLeftOp, kOutOfReach };
+  std::vector<Seen> seen_;
+  bool was_locked_ = false;
+  std::uint64_t lost_lock_at_ = 0;
+  std::uint32_t reintegrated_ = 0;
+  std::size_t reintegrating_ = 0;
   CycleDecision decision_;
   RunFigures figures_;
   FreeRunningTime start_;
   FreeRunningTime next_line_;
   std::uint64_t asked_at_ = 0;  ///< cycle in which OP was asked for
-  std::uint64_t moving_since_ = 0;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> csv_{nullptr, std::fclose};
 };
 
 [[nodiscard]] const char* name(CycleState state);
+[[nodiscard]] const char* name(RunEvent::Kind kind);
 void print_scan(const ethercat::MainDevice& main);
 /// One or two lines for the user: what failed, where, and what was expected.
 [[nodiscard]] std::string describe(const ethercat::Failure& failure);

@@ -43,6 +43,39 @@ Json drives_json(const MainRunner& runner) {
   return drives;
 }
 
+Json events_json(const RunFigures& figures) {
+  Json events = Json::array();
+  for (const RunEvent& event : figures.events) {
+    Json entry{{"time_s", event.time_s}, {"event", name(event.kind)}};
+    if (event.drive != RunEvent::kNobody) entry["drive"] = event.drive;
+    if (event.code != ethercat::AlStatusCode::kNoError) {
+      entry["al_status_code"] = static_cast<unsigned>(event.code);
+      entry["al_status"] = ethercat::name(event.code);
+    }
+    events.push_back(entry);
+  }
+  return events;
+}
+
+void print_events(const RunFigures& figures) {
+  constexpr std::size_t kMostLines = 40;
+  std::size_t lines = 0;
+  for (const RunEvent& event : figures.events) {
+    if (++lines > kMostLines) {
+      fmt::print("... {} more events (--json has them)\n", figures.events.size() - kMostLines);
+      return;
+    }
+    fmt::print("{:9.3f} s  ", event.time_s);
+    if (event.drive != RunEvent::kNobody) fmt::print("drive {}: ", event.drive);
+    fmt::print("{}", name(event.kind));
+    if (event.code != ethercat::AlStatusCode::kNoError) {
+      fmt::print(", AL status code 0x{:04X}: {}", static_cast<unsigned>(event.code),
+                 ethercat::name(event.code));
+    }
+    fmt::print("\n");
+  }
+}
+
 }  // namespace
 
 const char* name(CycleState state) {
@@ -55,6 +88,24 @@ const char* name(CycleState state) {
       return "locked";
     case CycleState::kCoasting:
       return "coasting";
+  }
+  return "unknown";
+}
+
+const char* name(RunEvent::Kind kind) {
+  switch (kind) {
+    case RunEvent::Kind::kLocked:
+      return "locked";
+    case RunEvent::Kind::kLockLost:
+      return "lock lost";
+    case RunEvent::Kind::kLeftOp:
+      return "left OP";
+    case RunEvent::Kind::kOutOfReach:
+      return "does not answer to its address";
+    case RunEvent::Kind::kReintegrated:
+      return "restarted: configured again";
+    case RunEvent::Kind::kBackInOp:
+      return "back in OP";
   }
   return "unknown";
 }
@@ -122,6 +173,11 @@ void print_run(const MainRunner& runner) {
              runner.options().servo_name,
              static_cast<double>(runner.options().servo.cycle.count()) * 1e-3, figures.cycles,
              figures.lock_cycle, figures.op_cycle);
+  if (figures.lock_losses > 0) {
+    fmt::print("lock lost {} times; longest way back {} cycles\n", figures.lock_losses,
+               figures.longest_relock);
+  }
+  print_events(figures);
   fmt::print(
       "working counter right in {} of {} cycles; lost frames {}; cycles that a stall of the "
       "host passed over {}\n",
@@ -158,6 +214,8 @@ Json run_json(const MainRunner& runner) {
             {"cycles_per_sync", runner.options().servo.cycles_per_sync},
             {"locked", runner.decision().state == CycleState::kLocked},
             {"lock_cycle", figures.lock_cycle},
+            {"lock_losses", figures.lock_losses},
+            {"longest_relock_cycles", figures.longest_relock},
             {"op_cycle", figures.op_cycle},
             {"working_counter_right", figures.working_counter_right},
             {"lost_frames", runner.main().counters().lost},
@@ -178,6 +236,8 @@ Json run_json(const MainRunner& runner) {
             {"slow", servo.slow},
             {"impossible", servo.impossible},
             {"resyncs", servo.resyncs},
+            {"reintegrated", runner.main().counters().reintegrated},
+            {"events", events_json(figures)},
             {"drives", drives_json(runner)}};
   if (runner.main().failure()) json["failure"] = describe(runner.main().failure());
   return json;

@@ -148,6 +148,8 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--fault", arguments->faults,
                       "cut:N@S, mend:N@S, restart:N@S or skew:N@S=PPM; may be repeated");
+  command->add_flag("!--sign-bit-behind", options.sign_bit_means_ahead,
+                    "bit 31 of 0x092C set when the drive's copy is behind, not ahead");
   command->add_option("--seed", options.seed, "of crystals and losses");
   command->add_option("--duration", options.duration_s, "stop after so many seconds");
   command->add_option("--priority", arguments->priority, "SCHED_FIFO priority")

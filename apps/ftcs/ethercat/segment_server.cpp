@@ -36,6 +36,17 @@ ethercat::Wiring wiring_of(const SegmentOptions& options, std::size_t n) {
   return wiring;
 }
 
+/// Every error that the drive raised since it was switched on, restarts included.
+Json faults_json(const ethercat::DriveApplication& drive) {
+  Json faults = Json::array();
+  for (const ethercat::DriveFault& fault : drive.faults()) {
+    faults.push_back({{"al_status_code", static_cast<unsigned>(fault.code)},
+                      {"al_status", ethercat::name(fault.code)},
+                      {"count", fault.count}});
+  }
+  return faults;
+}
+
 }  // namespace
 
 SegmentServer::SegmentServer(const SegmentOptions& options, platform::EthercatLink link)
@@ -62,6 +73,7 @@ void SegmentServer::build() {
     ethercat::SubDeviceConfig config;
     config.identity.serial = static_cast<std::uint32_t>(n + 1);
     // Local clocks that started at different times, as switched-on drives do.
+    config.clock.sign_bit_means_ahead = options_.sign_bit_means_ahead;
     config.clock.initial_local = Nanoseconds{1'000'000'007} * static_cast<std::int64_t>(n);
     static_cast<void>(segment_->add(config, wiring_of(options_, n), *crystals_.back()));
     segment_->power_cycle(n, on_wire(start_));
@@ -94,7 +106,12 @@ void SegmentServer::serve() {
   if (!received->by_kernel) ++user_stamps_;
   random_ = random_ * 6364136223846793005ULL + 1442695040888963407ULL;
   constexpr double kRange = 18446744073709551616.0;
-  const bool dropped = static_cast<double>(random_) / kRange < options_.drop;
+  const double draw = static_cast<double>(random_) / kRange;
+  const bool dropped = draw < options_.drop;
+  if (draw < options_.drop / 2) {
+    ++dropped_;
+    return;
+  }
   const auto passage = segment_->pass(*frame, on_wire(received->stamp));
   if (dropped || !passage.returned) {
     ++dropped_;
@@ -142,6 +159,9 @@ void SegmentServer::print_summary() const {
                  static_cast<double>(sync.smallest_margin_ns) * 1e-3,
                  static_cast<double>(sync.largest_margin_ns) * 1e-3);
     }
+    for (const ethercat::DriveFault& fault : device.drive().faults()) {
+      fmt::print("  raised 0x{:04X} {} times", static_cast<unsigned>(fault.code), fault.count);
+    }
     fmt::print("\n");
   }
 }
@@ -157,7 +177,8 @@ std::string SegmentServer::json() const {
                {"al_status", ethercat::name(device.drive().code())},
                {"system_time_difference_ns", device.system_time_difference()},
                {"sync0_events", sync.events},
-               {"sync0_missed", sync.missed}};
+               {"sync0_missed", sync.missed},
+               {"faults", faults_json(device.drive())}};
     if (sync.events > sync.missed) {
       drive["margin_min_ns"] = sync.smallest_margin_ns;
       drive["margin_max_ns"] = sync.largest_margin_ns;

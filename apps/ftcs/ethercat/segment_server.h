@@ -31,7 +31,10 @@ struct SegmentOptions {
   bool tree = false;                           ///< every SubDevice carries up to three; else a line
   Nanoseconds cable{50};
   Nanoseconds hop{300};
-  double drop = 0.0;  ///< share of the frames that are swallowed
+  /// Share of the frames that are swallowed, half of them before they reach a drive.
+  double drop = 0.0;
+  /// Bit 31 of 0x092C is documented both ways: set when the local copy is ahead, or behind.
+  bool sign_bit_means_ahead = true;
   std::uint64_t seed = 1;
   double duration_s = 0.0;  ///< zero: until a signal
   std::vector<SegmentFault> faults;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/ethercat/maindevice/configurator.h"
 
+#include <algorithm>
+
 namespace ftcs::ethercat {
 
 namespace {
@@ -33,9 +35,18 @@ bool can_do_without(const SdoDownload& object, const Failure& failure) noexcept 
 void Configurator::start(const ConfiguratorConfig& config) noexcept {
   config_ = config;
   step_ = Step::kMailboxes;
+  first_ = 0;
+  end_ = kAll;
   device_ = 0;
   sync0_start_ = 0;
   deadline_set_ = false;
+}
+
+void Configurator::start_one(const ConfiguratorConfig& config, std::size_t position) noexcept {
+  start(config);
+  first_ = position;
+  end_ = position + 1;
+  device_ = position;
 }
 
 bool Configurator::concerns(const SubDeviceInfo& device) const noexcept {
@@ -45,7 +56,7 @@ bool Configurator::concerns(const SubDeviceInfo& device) const noexcept {
     case Step::kObjects:
       return device.sii.coe() && !config_.objects.empty();
     case Step::kSizes:
-      return device.sii.coe();
+      return device.sii.coe() && end_ == kAll;
     case Step::kSync0:
       return config_.sync0 && device.dc();
     default:
@@ -66,14 +77,16 @@ void Configurator::begin() noexcept {
 }
 
 Progress Configurator::advance(Network& network, Failure& failure) noexcept {
+  const std::size_t end = std::min(end_, network.count);
   while (true) {
     ++device_;
     const bool once = step_ == Step::kReferenceTime;
-    if (device_ >= network.count || once) {
+    if (device_ >= end || once) {
       if (step_ == Step::kAwaitSafeOp) return Progress::kDone;
       step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
-      device_ = 0;
-      if (step_ == Step::kChannels && place_image(network, failure) == Progress::kFailed) {
+      device_ = first_;
+      if (step_ == Step::kChannels && end_ == kAll &&
+          place_image(network, failure) == Progress::kFailed) {
         return Progress::kFailed;
       }
       if (step_ == Step::kReferenceTime) {

@@ -33,6 +33,10 @@ inline constexpr std::size_t kMaxImageSize = 1400;
 class Configurator {
  public:
   void start(const ConfiguratorConfig& config) noexcept;
+  /// The same for one SubDevice whose process data has its place already.
+  void start_one(const ConfiguratorConfig& config, std::size_t position) noexcept;
+  /// Sync managers and FMMUs of all that are concerned have been written.
+  [[nodiscard]] bool channels_done() const noexcept { return step_ > Step::kChannels; }
   void request(FrameWriter& writer, const Network& network) noexcept;
   [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime now,
                                Failure& failure) noexcept;
@@ -83,6 +87,9 @@ class Configurator {
 
   ConfiguratorConfig config_;
   Step step_ = Step::kMailboxes;
+  static constexpr std::size_t kAll = kMaxSubDevices;
+  std::size_t first_ = 0;  ///< the SubDevices concerned, [first_, end_)
+  std::size_t end_ = kAll;
   std::size_t device_ = 0;
   std::size_t object_ = 0;
   SdoClient sdo_;

@@ -14,7 +14,8 @@ namespace ftcs::ethercat {
 struct CycleReport {
   bool inputs_valid = false;  ///< the working counter is as expected: inputs are of this cycle
   std::uint16_t working_counter = 0;
-  std::uint16_t expected = 0;
+  std::uint16_t expected = 0;  ///< of the SubDevices that take part at present
+  std::uint16_t whole = 0;     ///< of all that were configured
   bool has_reference = false;
   /// System time of the reference when the start of this frame passed it. As long as the frame is
   /// known: no wrap, no phase.
@@ -30,7 +31,9 @@ struct CycleReport {
 
 /// The cyclic frame: FRMW of the system time first (its latch is the start of frame), LRW of the
 /// process image, BRD of 0x092C, BRD of the AL status, and one datagram for the AL control or
-/// status of one SubDevice in turn.
+/// status of one SubDevice in turn; after a wrong working counter several, so that whoever is
+/// missing is soon known. A SubDevice that does not answer takes no part until it is admitted
+/// again: its process data is zero and nobody expects it in the working counter.
 class CyclicExchange {
  public:
   void start(const Network& network) noexcept;
@@ -39,27 +42,51 @@ class CyclicExchange {
 
   /// AL control for one SubDevice, sent in its turn with a later frame.
   void request_state(std::size_t position, std::uint16_t control) noexcept {
-    control_[position] = control;
+    if (takes_part_[position]) control_[position] = control;
   }
+  [[nodiscard]] bool takes_part(std::size_t position) const noexcept {
+    return takes_part_[position];
+  }
+  void admit(const Network& network, std::size_t position) noexcept {
+    set_part(network, position, true);
+  }
+  void dismiss(const Network& network, std::size_t position) noexcept {
+    set_part(network, position, false);
+  }
+  /// What the reference will show when the next frame passes it, as the MainDevice knows it: should
+  /// the reference be missing, the other clocks are given this instead of zero.
+  void set_reference_estimate(ReferenceTime estimate) noexcept { estimate_ = estimate; }
+  /// Datagrams of the last request.
+  [[nodiscard]] std::size_t datagrams() const noexcept { return datagrams_; }
   [[nodiscard]] Bytes outputs(const SubDeviceInfo& device) noexcept {
     return Bytes{image_}.subspan(device.outputs.offset, device.outputs.size);
   }
   [[nodiscard]] ConstBytes inputs(const SubDeviceInfo& device) const noexcept {
     return ConstBytes{image_}.subspan(device.inputs.offset, device.inputs.size);
   }
-  [[nodiscard]] std::uint16_t expected_working_counter() const noexcept { return expected_; }
 
  private:
+  void set_part(const Network& network, std::size_t position, bool part) noexcept;
+  [[nodiscard]] bool asks_reference(const Network& network) const noexcept {
+    return network.has_reference() && takes_part_[network.reference];
+  }
+  void take_reference(const Datagram& time, const Network& network, CycleReport& report) noexcept;
   [[nodiscard]] ReferenceTime unwrap(ConstBytes data, bool wide) noexcept;
-  void take_status(const Datagram& datagram, Network& network) noexcept;
+  void take_turns(const FrameView& turns, Network& network) noexcept;
 
   std::array<std::uint8_t, kMaxImageSize> image_{};
   std::size_t image_size_ = 0;
   std::size_t input_start_ = 0;
   std::uint16_t expected_ = 0;
+  std::uint16_t whole_ = 0;
+  std::array<bool, kMaxSubDevices> takes_part_{};
+  ReferenceTime estimate_;
+  std::size_t datagrams_ = 0;
   std::array<std::uint16_t, kMaxSubDevices> control_{};  ///< zero: nothing to send
   std::size_t turn_ = 0;
+  std::size_t turns_ = 0;  ///< SubDevices asked in this frame, turn_ the first
   bool turn_is_control_ = false;
+  bool hurry_ = false;  ///< the last working counter was wrong
   std::uint64_t last_reference_ = 0;
 };
 

@@ -37,6 +37,8 @@ const char* name(FailureKind kind) noexcept {
       return "process data larger than one frame";
     case FailureKind::kNoDistributedClock:
       return "no SubDevice with a distributed clock";
+    case FailureKind::kClockNotSteady:
+      return "clock does not follow the reference";
     case FailureKind::kWorkingCounter:
       return "working counter wrong";
     case FailureKind::kLinkLost:

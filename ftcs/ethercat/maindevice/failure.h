@@ -26,6 +26,7 @@ enum class FailureKind : std::uint8_t {
   kSdoMalformed,          ///< mailbox tells what is wrong
   kProcessImageTooLarge,  ///< more than one frame holds
   kNoDistributedClock,    ///< nobody can be the reference
+  kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received
   kLinkLost,              ///< too many lost frames in a row
 };

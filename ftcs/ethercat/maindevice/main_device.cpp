@@ -63,7 +63,8 @@ void MainDevice::write_frame(FrameWriter& writer) noexcept {
       }
       return;
     case Stage::kCyclic:
-      return exchange_.request(writer, network_);
+      exchange_.request(writer, network_);
+      return write_reintegration(writer);
     case Stage::kStopping:
       writer.add_value({Command::kBwr, 0, reg::kAlControl},
                        static_cast<std::uint16_t>(AlState::kSafeOp));
@@ -104,6 +105,8 @@ FrameOutcome MainDevice::on_frame(Bytes bytes, const FrameStamps& stamps) noexce
       return advance(configurator_.reply(*frame, network_, stamps.received, failure_));
     case Stage::kCyclic:
       cycle_ = exchange_.reply(*frame, network_);
+      if (reintegrator_asked_) reintegrate(frame->from(exchange_.datagrams()), stamps.received);
+      keep_members();
       return finish_cycle();
     case Stage::kStopping:
       if (--stop_frames_ > 0) return FrameOutcome::kProgress;
@@ -143,7 +146,75 @@ FrameOutcome MainDevice::advance(Progress progress) noexcept {
   return FrameOutcome::kProgress;
 }
 
+void MainDevice::write_reintegration(FrameWriter& writer) noexcept {
+  reintegrator_asked_ = reintegrator_.active();
+  if (!reintegrator_asked_) return;
+  if (writer.room() >= Reintegrator::room_needed(network_.devices[reintegrator_.position()])) {
+    return reintegrator_.request(writer, network_);
+  }
+  // Another frame may carry fewer states of the others; if not, its turn never comes.
+  reintegrator_asked_ = false;
+  if (++attempts_ < config_.reintegration_attempts * kMaxSubDevices) return;
+  reintegrator_.stop();
+  begin_stop({.kind = FailureKind::kProcessImageTooLarge,
+              .expected = static_cast<std::uint16_t>(writer.room())});
+}
+
+void MainDevice::reintegrate(const FrameView& frame, LocalTime now) noexcept {
+  const std::size_t position = reintegrator_.position();
+  Failure failure;
+  const Progress progress = reintegrator_.reply(frame, network_, cycle_.reference, now, failure);
+  if (progress == Progress::kDone) {
+    attempts_ = 0;
+    ++counters_.reintegrated;
+    exchange_.admit(network_, position);
+    if (op_requested_) {
+      exchange_.request_state(position, static_cast<std::uint16_t>(AlState::kOp));
+    }
+  }
+  // A failed attempt is followed by another from the beginning (keep_members).
+  if (progress == Progress::kFailed && ++attempts_ >= config_.reintegration_attempts) {
+    begin_stop(failure);
+  }
+}
+
+/// Who takes part: whoever is in SAFEOP or OP, and whoever has just been mapped again. Whoever is
+/// there and is neither gets its configuration back, one after another.
+void MainDevice::keep_members() noexcept {
+  const bool all_there = cycle_.answering == network_.count;
+  counters_.absent_in_a_row = all_there ? 0 : counters_.absent_in_a_row + 1;
+  there_in_a_row_ = all_there ? there_in_a_row_ + 1 : 0;
+  // After a wire was mended everybody is asked first: most have lost nothing.
+  const bool all_asked = there_in_a_row_ >= 2 * network_.count;
+  for (std::size_t n = 0; n < network_.count; ++n) {
+    const AlState state = network_.devices[n].state;
+    const bool coming = reintegrator_.active() && reintegrator_.position() == n;
+    const bool configured = state == AlState::kSafeOp || state == AlState::kOp;
+    const bool part = coming ? reintegrator_.mapped() : configured;
+    if (part != exchange_.takes_part(n)) {
+      part ? exchange_.admit(network_, n) : exchange_.dismiss(network_, n);
+    }
+    // Only what the cycle's own datagrams carry survives a wire that is cut.
+    if (coming && !all_there) reintegrator_.stop();
+    if (!part && !coming && all_asked && !reintegrator_.active()) {
+      reintegrator_.start(n, config_.process);
+    }
+  }
+}
+
+bool MainDevice::complete() const noexcept {
+  for (std::size_t n = 0; n < network_.count; ++n) {
+    if (!exchange_.takes_part(n)) return false;
+  }
+  return !reintegrator_.active();
+}
+
 FrameOutcome MainDevice::finish_cycle() noexcept {
+  if (counters_.absent_in_a_row >= config_.absence_limit) {
+    begin_stop({.kind = FailureKind::kWorkingCounter,
+                .expected = cycle_.whole,
+                .received = cycle_.working_counter});
+  }
   if (cycle_.inputs_valid) {
     counters_.wrong_in_a_row = 0;
     return FrameOutcome::kCycle;
@@ -151,7 +222,7 @@ FrameOutcome MainDevice::finish_cycle() noexcept {
   ++counters_.wrong_working_counter;
   if (++counters_.wrong_in_a_row >= config_.working_counter_limit) {
     begin_stop({.kind = FailureKind::kWorkingCounter,
-                .expected = cycle_.expected,
+                .expected = cycle_.whole,
                 .received = cycle_.working_counter});
   }
   return FrameOutcome::kCycle;
@@ -181,6 +252,7 @@ FrameOutcome MainDevice::on_timeout() noexcept {
 }
 
 void MainDevice::request_operational() noexcept {
+  op_requested_ = true;
   for (std::size_t n = 0; n < network_.count; ++n) {
     exchange_.request_state(n, static_cast<std::uint16_t>(AlState::kOp));
   }

@@ -8,6 +8,7 @@
 #include "ftcs/ethercat/maindevice/configurator.h"
 #include "ftcs/ethercat/maindevice/cyclic_exchange.h"
 #include "ftcs/ethercat/maindevice/network.h"
+#include "ftcs/ethercat/maindevice/reintegrator.h"
 #include "ftcs/ethercat/maindevice/scanner.h"
 
 namespace ftcs::ethercat {
@@ -23,6 +24,12 @@ struct MainDeviceConfig {
   /// sent to SAFEOP.
   std::uint32_t lost_frame_limit = 10;
   std::uint32_t working_counter_limit = 10;
+  /// Consecutive cycles in which fewer SubDevices answer than were scanned (a wire is cut) before
+  /// the rest is sent to SAFEOP. All stay in reach of a restarted one: it is brought back, below.
+  std::uint32_t absence_limit = 10;
+  /// A SubDevice that answers and has lost its configuration is configured again while the others
+  /// run; so often in a row at most.
+  std::uint32_t reintegration_attempts = 3;
   Nanoseconds sii_timeout{1'000'000'000};
 };
 
@@ -56,6 +63,8 @@ struct CycleCounters {
   std::uint64_t ignored = 0;
   std::uint32_t lost_in_a_row = 0;
   std::uint32_t wrong_in_a_row = 0;
+  std::uint32_t absent_in_a_row = 0;  ///< cycles in which fewer answered than were scanned
+  std::uint32_t reintegrated = 0;     ///< restarted SubDevices that are back
 };
 
 /// The EtherCAT MainDevice without a socket and without a clock: asks for frames to be sent and
@@ -84,6 +93,19 @@ class MainDevice {
   [[nodiscard]] const Network& network() const noexcept { return network_; }
   [[nodiscard]] const CycleReport& last_cycle() const noexcept { return cycle_; }
   [[nodiscard]] const CycleCounters& counters() const noexcept { return counters_; }
+  /// Position of the SubDevice that is being brought back at present; count(): none.
+  [[nodiscard]] std::size_t reintegrating() const noexcept {
+    return reintegrator_.active() ? reintegrator_.position() : network_.count;
+  }
+  /// In the cyclic stage: all that were configured exchange process data.
+  [[nodiscard]] bool complete() const noexcept;
+  [[nodiscard]] bool takes_part(std::size_t position) const noexcept {
+    return exchange_.takes_part(position);
+  }
+  /// CyclicExchange::set_reference_estimate().
+  void set_reference_estimate(ReferenceTime estimate) noexcept {
+    exchange_.set_reference_estimate(estimate);
+  }
   /// System time of the first SYNC0.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return configurator_.sync0_start(); }
 
@@ -98,6 +120,9 @@ class MainDevice {
   void write_frame(FrameWriter& writer) noexcept;
   [[nodiscard]] bool answers(const FrameView& frame) const noexcept;
   FrameOutcome advance(Progress progress) noexcept;
+  void write_reintegration(FrameWriter& writer) noexcept;
+  void reintegrate(const FrameView& frame, LocalTime now) noexcept;
+  void keep_members() noexcept;
   FrameOutcome finish_cycle() noexcept;
   void begin_stop(const Failure& failure) noexcept;
   [[nodiscard]] bool clocks_wanted() const noexcept {
@@ -112,6 +137,11 @@ class MainDevice {
   ClockSetup clock_setup_;
   Configurator configurator_;
   CyclicExchange exchange_;
+  Reintegrator reintegrator_;
+  bool reintegrator_asked_ = false;  ///< it has datagrams in the frame that is out
+  bool op_requested_ = false;
+  std::uint32_t attempts_ = 0;
+  std::size_t there_in_a_row_ = 0;  ///< cycles in which all answered
   CycleReport cycle_;
   CycleCounters counters_;
 

@@ -55,7 +55,17 @@ void DriveApplication::enter(AlState state) noexcept {
   publish_inputs();
 }
 
+void DriveApplication::remember(AlStatusCode code) noexcept {
+  for (std::size_t i = 0; i < fault_kinds_; ++i) {
+    if (faults_[i].code != code) continue;
+    ++faults_[i].count;
+    return;
+  }
+  if (fault_kinds_ < kFaultKinds) faults_[fault_kinds_++] = {code, 1};
+}
+
 void DriveApplication::refuse(AlStatusCode code) noexcept {
+  remember(code);
   error_ = true;
   code_ = code;
   op_requested_ = false;
@@ -63,6 +73,7 @@ void DriveApplication::refuse(AlStatusCode code) noexcept {
 }
 
 void DriveApplication::fail(AlStatusCode code) noexcept {
+  remember(code);
   error_ = true;
   code_ = code;
   const bool communication = code == AlStatusCode::kSyncManagerWatchdog;

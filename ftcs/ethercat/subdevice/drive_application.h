@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "ftcs/ethercat/subdevice/dc_unit.h"
 #include "ftcs/ethercat/subdevice/drive_motor.h"
@@ -23,6 +24,12 @@ struct SyncStatistics {
   std::int64_t largest_margin_ns = INT64_MIN;
   /// Margins over the cycle time, [0, 1) in 64 bins; longer ones in the last.
   std::array<std::uint32_t, kBins> histogram{};
+};
+
+/// An AL status code that was raised, and how often.
+struct DriveFault {
+  AlStatusCode code = AlStatusCode::kNoError;
+  std::uint32_t count = 0;
 };
 
 /// The application of the modelled drive, on the far side of the controller's memory: the AL state
@@ -58,6 +65,11 @@ class DriveApplication {
   [[nodiscard]] AlState state() const noexcept { return state_; }
   [[nodiscard]] AlStatusCode code() const noexcept { return code_; }
   [[nodiscard]] const SyncStatistics& statistics() const noexcept { return statistics_; }
+  /// All that was raised since the model was made, in the order of first appearance; the supply
+  /// does not matter.
+  [[nodiscard]] std::span<const DriveFault> faults() const noexcept {
+    return {faults_.data(), fault_kinds_};
+  }
   [[nodiscard]] const DriveMotor& motor() const noexcept { return motor_; }
   [[nodiscard]] DriveMotor& motor() noexcept { return motor_; }
   [[nodiscard]] const ObjectDictionary& objects() const noexcept { return objects_; }
@@ -65,6 +77,7 @@ class DriveApplication {
  private:
   void enter(AlState state) noexcept;
   void refuse(AlStatusCode code) noexcept;
+  void remember(AlStatusCode code) noexcept;
   void fail(AlStatusCode code) noexcept;
   void publish_state() noexcept;
   void publish_inputs() noexcept;
@@ -99,6 +112,9 @@ class DriveApplication {
   unsigned unsteady_ = 0;
   Duration last_sync0_{};
   SyncStatistics statistics_;
+  static constexpr std::size_t kFaultKinds = 16;
+  std::array<DriveFault, kFaultKinds> faults_{};
+  std::size_t fault_kinds_ = 0;
 };
 
 }  // namespace ftcs::ethercat

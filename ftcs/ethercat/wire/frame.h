@@ -53,6 +53,8 @@ class FrameView {
       return a.rest_.size() != b.rest_.size();
     }
 
+    [[nodiscard]] constexpr Bytes rest() const noexcept { return rest_; }
+
    private:
     [[nodiscard]] constexpr std::size_t size() const noexcept {
       return kDatagramOverhead + (load<std::uint16_t>(rest_, 6) & kLengthMask);
@@ -67,6 +69,12 @@ class FrameView {
     Iterator it = begin();
     for (; n > 0; --n) ++it;
     return *it;
+  }
+  /// The n-th datagram and those behind it; n <= count().
+  [[nodiscard]] constexpr FrameView from(std::size_t n) const noexcept {
+    Iterator it = begin();
+    for (std::size_t i = 0; i < n; ++i) ++it;
+    return {it.rest(), count_ - n};
   }
 
  private:
@@ -94,6 +102,11 @@ class FrameWriter {
     const Bytes data = add(target, sizeof(T));
     if (!data.empty()) store(data, 0, value);
     return data;
+  }
+  /// Bytes that are left, overhead of the next datagram included.
+  [[nodiscard]] constexpr std::size_t room() const noexcept {
+    const std::size_t limit = buffer_.size() < kMaxFrameSize ? buffer_.size() : kMaxFrameSize;
+    return overflow_ ? 0 : limit - used_;
   }
   [[nodiscard]] constexpr bool empty() const noexcept { return last_ == 0; }
   [[nodiscard]] constexpr std::uint8_t index() const noexcept { return index_; }
