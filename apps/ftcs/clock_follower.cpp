@@ -7,6 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include "apps/ftcs/real_clock.h"
+
 namespace ftcs::app {
 namespace {
 
@@ -57,6 +59,10 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& pair, FreeRun
                                                   std::optional<Duration> sync_interval) {
   const LocalTime local = clock_.local_at(pair.free_running);
   const Telemetry telemetry = discipline_.on_pair(pair);
+  if (telemetry.error) {
+    if (auto wrong = on_clock_error(*telemetry.error)) return wrong;
+  }
+  clock_refuses_ = telemetry.error.has_value();
   if (telemetry.offset_refused) {
     return fmt::format(
         "the first offset is {:.3f} s, more than {} s: set the clock near the "
@@ -89,6 +95,14 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& pair, FreeRun
   }
   follow_lock(now);
   return failure;
+}
+
+// What may pass is one warning for a series; what will not ends the run.
+std::optional<std::string> ClockFollower::on_clock_error(ClockError error) {
+  std::string text = describe("the clock", error);
+  if (error == ClockError::kGone || error == ClockError::kNotPermitted) return text;
+  if (!clock_refuses_) log_(LogLevel::kWarning, "{}: {}", label_, text);
+  return std::nullopt;
 }
 
 void ClockFollower::on_silence() {

@@ -58,6 +58,7 @@ class ClockFollower {
   void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
   void note_refusal(const Telemetry& telemetry, double time_s, std::optional<double> offset_ns);
   void follow_lock(FreeRunningTime now);
+  [[nodiscard]] std::optional<std::string> on_clock_error(ClockError error);
   [[nodiscard]] std::uint64_t samples_per_summary(std::optional<Duration> sync_interval) const;
 
   const PtpOptions& options_;
@@ -69,6 +70,7 @@ class ClockFollower {
   SampleSummary recent_;
   SampleSummary since_lock_;
   bool in_holdover_ = false;
+  bool clock_refuses_ = false;
   Status status_;
   FreeRunningTime last_used_{};
   std::optional<FreeRunningTime> locked_since_{};

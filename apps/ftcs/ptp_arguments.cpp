@@ -74,14 +74,7 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
   flags.refuse("-2", "transport over IEEE 802.3 is not supported");
   flags.refuse("-6", "transport over UDP/IPv6 is not supported");
   flags.refuse("-L", "legacy time stamping is not supported");
-  command
-      .add_option_function<std::string>(
-          "-p",
-          [](const std::string&) {
-            throw CLI::ValidationError("-p", "steering a hardware clock is not supported");
-          },
-          "not supported: the steered clock is virtual")
-      ->type_name("DEVICE");
+  flags.value("-p", arguments.clock, "DEVICE", "PTP hardware clock to steer, as --clock DEVICE");
 }
 
 void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
@@ -103,7 +96,8 @@ void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
 
 void add_clock_flags(CLI::App& command, PtpArguments& arguments) {
   Flags flags(command);
-  flags.value("--clock", arguments.clock, "NAME", "virtual (the only one)");
+  flags.value("--clock", arguments.clock, "NAME",
+              "what is steered: virtual (default), system, phc, /dev/ptpN, auto");
   flags.value("--offset", arguments.offset, "TIME",
               "the virtual clock starts at CLOCK_REALTIME plus this, for example 1ms");
   flags.value("--skew", arguments.skew, "RATE",

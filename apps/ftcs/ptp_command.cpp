@@ -72,8 +72,24 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
 }
 
 Wrong apply_clock(const PtpArguments& arguments, PtpOptions& options) {
-  if (arguments.clock != "virtual") {
-    return fmt::format("--clock: '{}' is not supported, only virtual", arguments.clock);
+  const std::string& clock = arguments.clock;
+  if (clock == "virtual") {
+    options.clock = ClockKind::kVirtual;
+  } else if (clock == "system") {
+    options.clock = ClockKind::kSystem;
+  } else if (clock == "auto") {
+    options.clock = ClockKind::kAuto;
+  } else if (clock == "phc" || clock.starts_with("/dev/")) {
+    options.clock = ClockKind::kPhc;
+    if (clock != "phc") options.clock_device = clock;
+  } else {
+    return fmt::format("--clock: '{}': expected virtual, system, phc, /dev/ptpN or auto", clock);
+  }
+  if (options.clock != ClockKind::kVirtual) {
+    if (options.role == Role::kTimeTransmitter)
+      return "a time transmitter steers no clock: --clock";
+    if (!arguments.offset.empty()) return "--offset: only of the virtual clock";
+    if (!arguments.skew.empty()) return "--skew: only of the virtual clock";
   }
   if (auto wrong = set_duration(arguments.offset, "--offset", options.initial_offset)) return wrong;
   if (!arguments.skew.empty()) {

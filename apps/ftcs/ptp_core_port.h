@@ -17,8 +17,8 @@ class PtpCorePort : public PtpPort {
  protected:
   PtpCorePort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
               std::unique_ptr<platform::TimestampClock> timestamps,
-              const typename Core::Config& config)
-      : PtpPort(kernel, options, log, std::move(timestamps)), core_(config) {}
+              const typename Core::Config& config, RealClock* real_clock = nullptr)
+      : PtpPort(kernel, options, log, std::move(timestamps), real_clock), core_(config) {}
 
   [[nodiscard]] Core& core() { return core_; }
   [[nodiscard]] const Core& core() const { return core_; }

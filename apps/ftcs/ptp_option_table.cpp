@@ -180,6 +180,10 @@ constexpr std::array kSettings{
     PtpSetting{"network_transport", "UDPv4", FTCS_SET((void(o), only(v, "UDPv4")))},
     PtpSetting{"delay_mechanism", "E2E", FTCS_SET((void(o), only(v, "E2E")))},
     PtpSetting{"clock_servo", "pi (as --servo linuxptp-pi)", set_clock_servo},
+    PtpSetting{"kernel_leap", "1: the kernel makes leap seconds (system clock)",
+               FTCS_SET(boolean(v, o.kernel_leap))},
+    PtpSetting{"leapfile", "leap-seconds.list, where Announce has no UTC offset",
+               FTCS_SET((o.leap_file = v, Wrong{}))},
     PtpSetting{"free_running", "1: measure, do not steer", FTCS_SET(boolean(v, o.free_running))},
     PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
     PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
@@ -254,7 +258,6 @@ constexpr std::array kFixed{
     Fixed{"unicast_req_duration", kAny},  // unicast negotiation only
     Fixed{"use_syslog", kAny},            // messages go to standard output
     Fixed{"verbose", kAny},
-    Fixed{"kernel_leap", kAny},  // the virtual clock has no kernel
     Fixed{"check_fup_sync", "0"},
     Fixed{"sanity_freq_limit", kAny},  // RAW is the estimator's clock: nothing to check against
     Fixed{"ntpshm_segment", "0"},

@@ -16,6 +16,14 @@
 namespace ftcs::app {
 
 enum class Role : std::uint8_t { kTimeReceiver, kTimeTransmitter };
+/// What is steered. Timestamps are taken from the same clock: software stamps from CLOCK_REALTIME,
+/// hardware stamps from the adapter's.
+enum class ClockKind : std::uint8_t {
+  kVirtual,  ///< arithmetic alone; the machine's clocks are read
+  kSystem,   ///< CLOCK_REALTIME
+  kPhc,      ///< the adapter's PTP hardware clock
+  kAuto,     ///< the adapter's, if it has one, else CLOCK_REALTIME
+};
 enum class Output : std::uint8_t { kText, kJson, kCsv };
 
 /// As the servos' own, but for one: Sync messages of a busy machine come early or late by a tenth
@@ -54,8 +62,12 @@ struct PtpOptions {
   Nanoseconds delay_asymmetry{0};
 
   ServoConfig servo = ptp_servo_defaults();
-  bool free_running = false;  ///< ptp4l's free_running: measure, steer nothing
-  bool first_step = false;    ///< step once, whatever the servo
+  ClockKind clock = ClockKind::kVirtual;
+  std::string clock_device{};  ///< kPhc: /dev/ptpN, which must be the interface's; empty: any
+  std::string leap_file{};     ///< leap-seconds.list
+  bool kernel_leap = true;     ///< ptp4l's kernel_leap: leap seconds are the kernel's to make
+  bool free_running = false;   ///< ptp4l's free_running: measure, steer nothing
+  bool first_step = false;     ///< step once, whatever the servo
   Nanoseconds first_step_threshold{20'000};
   Nanoseconds step_threshold{0};
 

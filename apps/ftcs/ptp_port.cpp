@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/ptp_clock.h"
 #include "apps/ftcs/ptp_receiver.h"
 #include "apps/ftcs/ptp_transmitter.h"
 #include "ftcs/platform/network_interface.h"
@@ -25,13 +26,14 @@ VirtualClockConfig clock_config(const PtpOptions& options,
 }  // namespace
 
 PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
-                 std::unique_ptr<platform::TimestampClock> timestamps)
+                 std::unique_ptr<platform::TimestampClock> timestamps, RealClock* real_clock)
     : options_(options),
       log_(log),
       timestamps_(std::move(timestamps)),
       start_(options.start ? *options.start : timestamps_->read_realtime()),
       oscillator_(timestamps_->source(), Rate::from_ppb(options.skew_ppb), start_.free_running),
-      clock_(oscillator_, clock_config(options, start_)),
+      virtual_clock_(oscillator_, clock_config(options, start_)),
+      real_clock_(real_clock),
       transport_(kernel, options.socket, *timestamps_, *this) {}
 
 int PtpPort::run() {
@@ -41,11 +43,13 @@ int PtpPort::run() {
     return kRuntimeError;
   }
   report_stamps();
+  if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
   const platform::StopFlag stop;
   perform(start(now()));
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
   while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
+  if (real_clock_ != nullptr) real_clock_->stop();
   if (failure_) {
     log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
@@ -58,6 +62,7 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   FreeRunningTime until = now() + kLongestTurn;
   if (end) until = std::min(until, *end);
   if (const auto due = deadline()) until = std::min(until, *due);
+  if (real_clock_ != nullptr) real_clock_->before_wait();
   transport_.wait_until(oscillator_.to_underlying(until));
   if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
   for (const ptp::EventId& id : std::exchange(unsent_, {})) {
@@ -142,6 +147,12 @@ void PtpPort::on_link(bool up, const std::string& reason) {
   perform(on_link_change(up, now()));
 }
 
+void PtpPort::on_readable(int descriptor) {
+  if (real_clock_ != nullptr && descriptor == real_clock_->wake_descriptor()) {
+    real_clock_->on_wake();
+  }
+}
+
 void PtpPort::report_stamps() {
   const platform::PtpSocket* socket = transport_.socket();
   if (socket == nullptr) return;
@@ -165,9 +176,9 @@ Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& ker
 
 int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
   Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
-  auto timestamps = platform::TimestampClock::open(kernel, options.interface, options.timestamps);
-  if (!timestamps) {
-    log(LogLevel::kError, "{}", timestamps.error().message());
+  auto clocks = open_ptp_clocks(kernel, options, log);
+  if (!clocks) {
+    log(LogLevel::kError, "{}", clocks.error());
     return kRuntimeError;
   }
   const auto identity = port_identity(kernel, options);
@@ -176,9 +187,11 @@ int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
     return kRuntimeError;
   }
   if (options.role == Role::kTimeReceiver) {
-    return PtpReceiver(kernel, options, log, std::move(*timestamps), *identity).run();
+    return PtpReceiver(kernel, options, log, std::move(clocks->timestamps), *identity,
+                       clocks->real.get())
+        .run();
   }
-  return PtpTransmitter(kernel, options, log, std::move(*timestamps), *identity).run();
+  return PtpTransmitter(kernel, options, log, std::move(clocks->timestamps), *identity).run();
 }
 
 }  // namespace ftcs::app

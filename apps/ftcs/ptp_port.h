@@ -11,6 +11,7 @@
 
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
+#include "apps/ftcs/real_clock.h"
 #include "ftcs/clock/skewed_source.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/platform/ptp_transport.h"
@@ -26,8 +27,10 @@ namespace ftcs::app {
 /// free-running oscillator.
 class PtpPort : private platform::TransportHandler {
  public:
+  /// `timestamps` may be bound to a real clock (TimestampClock::steer()), which is then steered;
+  /// otherwise a virtual one is made.
   PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
-          std::unique_ptr<platform::TimestampClock> timestamps);
+          std::unique_ptr<platform::TimestampClock> timestamps, RealClock* real_clock = nullptr);
   ~PtpPort() override = default;
 
   /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
@@ -57,7 +60,12 @@ class PtpPort : private platform::TransportHandler {
   void fail(const std::string& reason);
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
   [[nodiscard]] SkewedSource& oscillator() { return oscillator_; }
-  [[nodiscard]] VirtualClock& clock() { return clock_; }
+  [[nodiscard]] AdjustableClock& clock() {
+    if (real_clock_ != nullptr) return real_clock_->clock();
+    return virtual_clock_;
+  }
+  /// Null: the clock is virtual.
+  [[nodiscard]] RealClock* real_clock() { return real_clock_; }
   [[nodiscard]] const PtpOptions& options() const { return options_; }
   [[nodiscard]] Log& log() { return log_; }
   [[nodiscard]] double seconds_since_start() { return (now() - start_.free_running).seconds(); }
@@ -67,6 +75,7 @@ class PtpPort : private platform::TransportHandler {
   void on_message(const platform::ReceivedMessage& message) override;
   void on_transmitted(const platform::TransmittedMessage& message) override;
   void on_link(bool up, const std::string& reason) override;
+  void on_readable(int descriptor) override;
   void send(const ptp::SendMessage& message);
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
@@ -76,7 +85,8 @@ class PtpPort : private platform::TransportHandler {
   std::unique_ptr<platform::TimestampClock> timestamps_;
   platform::TimestampClock::RealtimeReading start_;
   SkewedSource oscillator_;
-  VirtualClock clock_;
+  VirtualClock virtual_clock_;
+  RealClock* real_clock_;
   platform::PtpTransport transport_;
   std::optional<in_addr> sender_{};  ///< of the message that is being handled
   std::optional<platform::StampSource> reported_stamps_{};

@@ -25,14 +25,24 @@ ptp::TimeReceiverConfig core_config(const PtpOptions& options, const ptp::PortId
   return config;
 }
 
+ReferenceScale scale_of(const ptp::TransmitterData& transmitter) {
+  const auto has = [&](std::uint16_t mask) { return (transmitter.flags & mask) != 0; };
+  ReferenceScale scale;
+  scale.tai = has(ptp::flag::kPtpTimescale);
+  if (has(ptp::flag::kUtcOffsetValid)) scale.utc_offset = transmitter.announce.utc_offset;
+  scale.leap = (has(ptp::flag::kLeap61) ? 1 : 0) - (has(ptp::flag::kLeap59) ? 1 : 0);
+  return scale;
+}
+
 }  // namespace
 
 PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                          std::unique_ptr<platform::TimestampClock> timestamps,
-                         const ptp::PortIdentity& identity)
+                         const ptp::PortIdentity& identity, RealClock* real_clock)
     : PtpCorePort(kernel, options, log, std::move(timestamps),
                   core_config(options, identity,
-                              static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW)))),
+                              static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW))),
+                  real_clock),
       follower_(this->options(), log, clock(), now(), has_hardware_stamps(),
                 "port 1 (" + options.interface + ")") {}
 
@@ -57,6 +67,7 @@ void PtpReceiver::act(const ptp::Action& action) {
 }
 
 void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
+  if (real_clock() != nullptr) real_clock()->set_reference_scale(scale_of(selected.transmitter));
   if (!selected.changed) return;
   log()(LogLevel::kNotice, "selected best master clock {}",
         to_text(selected.transmitter.announce.grandmaster).view());
@@ -86,6 +97,13 @@ void PtpReceiver::follow_lock(bool locked) {
 
 void PtpReceiver::housekeeping(FreeRunningTime) {
   follower_.on_silence();
+  if (real_clock() != nullptr) {
+    const ClockDiscipline& discipline = follower_.discipline();
+    if (const auto wrong = real_clock()->attend(discipline.counters().commands > 0,
+                                                discipline.locked(), discipline.latest().servo)) {
+      return fail(*wrong);
+    }
+  }
   if (!follower_.locked()) follow_lock(false);  // only a sample can say that it is locked again
 }
 

@@ -9,12 +9,12 @@
 
 namespace ftcs::app {
 
-/// A virtual clock that follows a PTP time transmitter.
+/// A clock, virtual or real, that follows a PTP time transmitter.
 class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver> {
  public:
   PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
               std::unique_ptr<platform::TimestampClock> timestamps,
-              const ptp::PortIdentity& identity);
+              const ptp::PortIdentity& identity, RealClock* real_clock);
 
  private:
   ptp::ActionList start(FreeRunningTime now) override;

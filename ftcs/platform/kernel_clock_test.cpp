@@ -332,6 +332,19 @@ TEST(ClockDevice, the_second_program_on_a_clock_is_refused) {
   EXPECT_EQ(kernel.commands, 0);
 }
 
+TEST(ClockDevice, a_name_of_this_host_is_held_by_one_process) {
+  LinuxKernel kernel;
+  const std::string name =
+      "ftcs test of a name " + std::to_string(kernel.clock_ns(CLOCK_MONOTONIC));
+  {
+    const Descriptor first(kernel, kernel.hold_name(name.c_str()));
+    if (!first.is_open()) GTEST_SKIP() << "no UNIX sockets here";
+    EXPECT_EQ(kernel.hold_name(name.c_str()), -EADDRINUSE);
+  }
+  const Descriptor again(kernel, kernel.hold_name(name.c_str()));
+  EXPECT_TRUE(again.is_open()) << "free again once it is closed";
+}
+
 TEST(ClockDevice, missing_rights_are_found_without_touching_the_clock) {
   FakeClocks kernel;
   kernel.adjust_errno = EPERM;

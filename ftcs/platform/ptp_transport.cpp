@@ -57,15 +57,16 @@ void PtpTransport::wait_until(FreeRunningTime deadline) {
 }
 
 void PtpTransport::poll_sockets(FreeRunningTime deadline) {
-  std::array<pollfd, 2> descriptors{};
-  std::size_t count = 0;
+  // The sockets keep the first two places, watched ones follow; a negative descriptor is ignored.
+  std::array<pollfd, 2 + kLargestWatch> descriptors{{{-1, 0, 0}, {-1, 0, 0}}};
+  std::size_t count = 2;
   if (socket_) {
     constexpr auto kEvents = static_cast<short>(POLLIN | POLLPRI);
     descriptors[0] = {socket_->descriptor(Channel::kEvent), kEvents, 0};
     descriptors[1] = {socket_->descriptor(Channel::kGeneral), POLLIN, 0};
-    count = 2;
     if (const auto overdue = socket_->next_deadline()) deadline = std::min(deadline, *overdue);
   }
+  for (const int descriptor : watched_) descriptors[count++] = {descriptor, POLLIN, 0};
   const int timeout = poll_timeout_ms(deadline - clock_.source().now());
   if (kernel_.poll({descriptors.data(), count}, timeout) <= 0) return;
   constexpr auto kTransmitted = static_cast<short>(POLLPRI | POLLERR);
@@ -78,6 +79,9 @@ void PtpTransport::poll_sockets(FreeRunningTime deadline) {
   }
   if ((descriptors[0].revents & POLLIN) != 0) receive(Channel::kEvent);
   if ((descriptors[1].revents & (POLLIN | POLLERR)) != 0) receive(Channel::kGeneral);
+  for (std::size_t i = 2; i < count; ++i) {
+    if ((descriptors[i].revents & POLLIN) != 0) handler_.on_readable(descriptors[i].fd);
+  }
 }
 
 void PtpTransport::receive(Channel channel) {

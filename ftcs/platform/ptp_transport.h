@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "ftcs/platform/kernel.h"
 #include "ftcs/platform/ptp_socket.h"
@@ -23,6 +24,8 @@ class TransportHandler {
   virtual void on_transmitted(const TransmittedMessage& message) = 0;
   /// The link went up or down; `reason` is empty when it came up.
   virtual void on_link(bool up, const std::string& reason) = 0;
+  /// A descriptor given to PtpTransport::watch() can be read.
+  virtual void on_readable(int) {}
 
  protected:
   TransportHandler() = default;
@@ -48,6 +51,13 @@ class PtpTransport {
   /// event or a signal, and at the latest after a quarter of a second.
   void wait_until(FreeRunningTime deadline);
 
+  /// Another descriptor that ends the wait when it can be read: a timer finer than poll's
+  /// milliseconds. At most kLargestWatch; a negative one is none.
+  void watch(int descriptor) {
+    if (descriptor >= 0 && watched_.size() < kLargestWatch) watched_.push_back(descriptor);
+  }
+  static constexpr std::size_t kLargestWatch = 4;
+
   [[nodiscard]] bool is_up() const noexcept { return socket_.has_value() && carrier_; }
   /// No value while the link is down.
   [[nodiscard]] const PtpSocket* socket() const noexcept { return socket_ ? &*socket_ : nullptr; }
@@ -65,6 +75,7 @@ class PtpTransport {
   TimestampClock& clock_;
   TransportHandler& handler_;
   std::optional<PtpSocket> socket_;
+  std::vector<int> watched_;
   bool carrier_ = true;
   bool carrier_is_reported_ = false;  // some virtual interfaces never say IFF_RUNNING
   bool suspect_ = false;              // a call failed: look at the link at once

@@ -23,6 +23,9 @@ struct Recorder final : TransportHandler {
   void on_transmitted(const TransmittedMessage& message) override {
     events.emplace_back(message.stamp ? "stamp" : "no stamp");
   }
+  void on_readable(int descriptor) override {
+    events.push_back("readable " + std::to_string(descriptor));
+  }
   void on_link(bool up, const std::string& reason) override {
     events.push_back(up ? "up" : "down: " + reason);
   }
@@ -48,6 +51,17 @@ struct Bench {
 
 using std::chrono::seconds;
 using Events = std::vector<std::string>;
+
+TEST(PtpTransport, wakes_for_a_watched_descriptor) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  constexpr int kWatched = 77;
+  bench.kernel.sockets[kWatched].received.push_back({std::vector<std::uint8_t>(8), 0, 0});
+  bench.transport.watch(-1);
+  bench.transport.watch(kWatched);
+  bench.transport.wait_until(bench.clock->source().now() + Duration{seconds{1}});
+  EXPECT_EQ(bench.recorder.events, Events{"readable 77"});
+}
 
 TEST(PtpTransport, hands_over_messages_and_transmit_stamps) {
   Bench bench;

@@ -28,11 +28,19 @@ TimestampClock::TimestampClock(Kernel& kernel, TimestampMode mode,
       hardware_(std::move(hardware)) {}
 
 FreeRunningSource& TimestampClock::source() noexcept {
+  if (steered_ != nullptr) return *steered_;
   if (hardware_) return *hardware_;
   return raw_;
 }
 
 std::optional<Stamp> TimestampClock::convert(const KernelStamps& stamps) noexcept {
+  if (steered_ != nullptr) {
+    const std::int64_t stamp = is_hardware() ? stamps.hardware_ns : stamps.software_ns;
+    if (stamp == 0) return std::nullopt;
+    const auto instant = steered_->from_stamp(stamp);
+    if (!instant) return std::nullopt;
+    return Stamp{*instant, is_hardware() ? StampSource::kHardware : StampSource::kSoftware};
+  }
   if (hardware_) {
     if (stamps.hardware_ns == 0) return std::nullopt;
     return Stamp{FreeRunningTime::from_ns(stamps.hardware_ns), StampSource::kHardware};
@@ -44,6 +52,7 @@ std::optional<Stamp> TimestampClock::convert(const KernelStamps& stamps) noexcep
 }
 
 TimestampClock::RealtimeReading TimestampClock::read_realtime() noexcept {
+  if (steered_ != nullptr) return {steered_->now(), kernel_.clock_ns(CLOCK_REALTIME)};
   if (!hardware_) {
     const RealtimeToRaw::Reading reading = realtime_.read();
     return {FreeRunningTime::from_ns(reading.raw_ns), reading.realtime_ns};

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "ftcs/platform/kernel.h"
+#include "ftcs/platform/kernel_clock.h"
 #include "ftcs/platform/network_interface.h"
 #include "ftcs/platform/os_error.h"
 #include "ftcs/platform/raw_clock.h"
@@ -51,7 +52,12 @@ class TimestampClock {
   TimestampClock(Kernel& kernel, TimestampMode mode, std::optional<HardwareClock> hardware);
 
   [[nodiscard]] FreeRunningSource& source() noexcept;
-  [[nodiscard]] bool is_hardware() const noexcept { return hardware_.has_value(); }
+  [[nodiscard]] bool is_hardware() const noexcept {
+    return steered_ != nullptr ? !steered_->device().is_system() : hardware_.has_value();
+  }
+  /// From now on timestamps are readings of a clock that is steered: CLOCK_REALTIME (software
+  /// stamps) or the adapter's (hardware). It must outlive this.
+  void steer(KernelClock& clock) noexcept { steered_ = &clock; }
   [[nodiscard]] TimestampMode mode() const noexcept { return mode_; }
 
   /// A kernel stamp on the free-running clock. No value: the kernel gave none of the kind that we
@@ -75,6 +81,7 @@ class TimestampClock {
   RawClock raw_;
   RealtimeToRaw realtime_;
   std::optional<HardwareClock> hardware_;
+  KernelClock* steered_ = nullptr;
 };
 
 }  // namespace ftcs::platform

@@ -36,8 +36,9 @@ expect 2 "only one port" ptp -i lo -i eth0
 expect 2 "peer delay mechanism is not supported" ptp -i lo -P
 expect 2 "IEEE 802.3 is not supported" ptp -i lo -2
 expect 2 "UDP/IPv6 is not supported" ptp -i lo -6
-expect 2 "hardware clock is not supported" ptp -i lo -p /dev/ptp0
-expect 2 "only virtual" ptp -i lo --clock realtime
+expect 2 "expected virtual, system, phc, /dev/ptpN or auto" ptp -i lo --clock realtime
+expect 2 "only of the virtual clock" ptp -i lo --clock auto --skew 1ppm
+expect 2 "a time transmitter steers no clock" ptp -i lo --clock auto --role time-transmitter
 expect 2 "unknown servo 'magic'" ptp -i lo --servo magic
 expect 2 "offset gain must lie between 0 and 1" ptp -i lo --servo ftcs --offset-gain 2
 expect 2 "is no band" ptp -i lo --servo ftcs --converged-band 5us:1us

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/real_clock.h"
+
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+namespace ftcs::app {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr std::int64_t kSecondsPerDay = 86'400;
+/// A leap that has not come so long after its time does not come any more.
+constexpr std::int64_t kPatienceS = 10;
+
+}  // namespace
+
+std::string describe(const std::string& clock, ClockError error) {
+  switch (error) {
+    case ClockError::kNotPermitted:
+      return clock + ": not permitted to steer it";
+    case ClockError::kBusy:
+      return clock + ": busy, the kernel refuses to steer it now";
+    case ClockError::kGone:
+      return clock + ": the device is gone";
+    case ClockError::kRateOutOfLimits:
+      return clock + ": refuses the rate or step as out of its range";
+    case ClockError::kNotFinite:
+      break;
+  }
+  return clock + ": was asked for a rate that is no number";
+}
+
+RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc)
+    : kernel_(kernel), log_(log), clock_(std::move(clock)), timer_(kernel), utc_(std::move(utc)) {}
+
+void RealClock::before_wait() {
+  if (const auto wait = clock_.wait_for_expiry_ns()) timer_.set(*wait);
+}
+
+void RealClock::on_wake() {
+  timer_.acknowledge();
+  (void)clock_.read();  // ends what is due
+}
+
+void RealClock::set_reference_scale(const ReferenceScale& scale) {
+  const bool first = !std::exchange(scale_known_, true);
+  const ReferenceScale old = std::exchange(scale_, scale);
+  if (!is_system()) return;
+  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
+  int offset = 0;
+  if (scale.tai) {
+    const auto listed = utc_.leap_seconds ? utc_.leap_seconds->at(utc_s) : std::nullopt;
+    offset = scale.utc_offset.value_or(listed ? listed->utc_offset : utc_.utc_offset);
+    if (!scale.utc_offset && (first || old.utc_offset)) {
+      log_(LogLevel::kNotice, "{}: the reference does not vouch for its UTC offset; using {} s{}",
+           name(), offset, listed ? " of the leap second list" : "");
+    }
+  }
+  const Duration wanted = Duration::from_whole_ns(offset * kNsPerSecond);
+  const Duration after_leap =
+      clock_.timescale_offset() + Duration::from_whole_ns(armed_leap_ * kNsPerSecond);
+  if (armed_leap_ != 0 && wanted == after_leap) return;  // the leap itself will bring it
+  if (wanted == clock_.timescale_offset()) return;
+  log_(first ? LogLevel::kInfo : LogLevel::kWarning, "{}: UTC is {} s behind the reference", name(),
+       offset);
+  clock_.set_timescale_offset(wanted);
+}
+
+std::optional<std::string> RealClock::attend(bool steering, bool locked,
+                                             const ServoSnapshot& servo) {
+  if (const auto error = clock_.failure()) return describe(name(), *error);
+  const std::int64_t raw_s = kernel_.clock_ns(CLOCK_MONOTONIC_RAW) / kNsPerSecond;
+  if (raw_s == attended_raw_s_) return std::nullopt;
+  attended_raw_s_ = raw_s;
+  report_foreign();
+  if (is_system()) {
+    follow_leap(steering);
+    if (steering) publish(locked, servo);
+  }
+  return std::nullopt;
+}
+
+void RealClock::report_foreign() {
+  const platform::ForeignSteering foreign = clock_.take_foreign_steering();
+  if (foreign.found_rate) {
+    log_(LogLevel::kWarning,
+         "{}: another program changed the frequency: expected {:+.3f} ppb, found {:+.3f} ppb",
+         name(), foreign.expected_rate->ppb(), foreign.found_rate->ppb());
+  }
+  if (foreign.step) {
+    log_(LogLevel::kWarning, "{}: another program stepped the clock by {:+.9f} s", name(),
+         foreign.step->seconds());
+  }
+  if (foreign.leap != 0) {
+    leap_is_done();
+    log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
+         foreign.leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
+  }
+}
+
+// Announce is believed, and else the list; either on days alone on which leap seconds happen.
+int RealClock::armed_leap(std::int64_t utc_s) const {
+  if (!scale_.tai || utc_s < no_leap_before_s_ || !is_last_day_of_month(utc_s)) return 0;
+  if (scale_.leap != 0) return scale_.leap;
+  if (!utc_.leap_seconds) return 0;
+  const auto listed = utc_.leap_seconds->at(utc_s);
+  return listed ? listed->leap : 0;
+}
+
+// An inserted second is the day's last one again, and Announce may go on announcing it for a while.
+void RealClock::leap_is_done() {
+  armed_leap_ = 0;
+  no_leap_before_s_ = armed_midnight_s_ + kPatienceS;
+}
+
+void RealClock::follow_leap(bool steering) {
+  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
+  // One that we make ourselves is late by a turn of the loop at most.
+  const bool ours_is_due = !utc_.kernel_leap && armed_leap_ != 0 && steering &&
+                           utc_s >= armed_midnight_s_ - (armed_leap_ < 0 ? 1 : 0);
+  if (ours_is_due) {
+    const int leap = armed_leap_;
+    leap_is_done();
+    if (const auto error = clock_.leap_now(leap)) {
+      log_(LogLevel::kError, "leap second: {}", describe(name(), *error));
+    } else {
+      log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
+           leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
+    }
+    return;
+  }
+  const int leap = armed_leap(utc_s);
+  if (leap == armed_leap_) return;
+  // In the last second the kernel is already about to leap: too late to think again.
+  const bool is_happening =
+      utc_s >= armed_midnight_s_ - 1 && utc_s < armed_midnight_s_ + kPatienceS;
+  if (armed_leap_ != 0 && leap == 0 && is_happening) return;
+  armed_leap_ = leap;
+  armed_midnight_s_ = (utc_s / kSecondsPerDay + 1) * kSecondsPerDay;
+  clock_.expect_leap(utc_.kernel_leap ? leap : 0);
+  if (leap != 0) {
+    log_(LogLevel::kNotice, "{}: a leap second will be {} at the end of this UTC day", name(),
+         leap > 0 ? "inserted" : "left out");
+  }
+}
+
+void RealClock::publish(bool locked, const ServoSnapshot& servo) {
+  platform::TimeStatus status;
+  status.synchronised = locked;
+  status.leap = utc_.kernel_leap ? armed_leap_ : 0;
+  if (scale_.tai && scale_known_) {
+    status.tai_offset = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
+  }
+  const double sigma_ns = std::isfinite(servo.offset_sigma_ns) ? servo.offset_sigma_ns : 0.0;
+  const double offset_ns = std::abs(servo.offset.ns());
+  constexpr double kNsPerUs = 1e3;
+  constexpr double kSigmas = 3.0;
+  status.estimated_error_us = std::llround(std::ceil((offset_ns + sigma_ns) / kNsPerUs));
+  // Half the way there and back bounds what an asymmetry can hide.
+  status.largest_error_us = std::llround(
+      std::ceil((offset_ns + kSigmas * sigma_ns + std::abs(servo.path_delay.ns())) / kNsPerUs));
+  const int result = platform::publish(kernel_, status);
+  if (result < 0 && !publish_failed_) {
+    log_(LogLevel::kWarning, "{}: cannot tell the kernel that it is synchronised: {}", name(),
+         std::strerror(-result));
+  }
+  publish_failed_ = result < 0;
+}
+
+void RealClock::stop() { clock_.settle(); }
+
+}  // namespace ftcs::app

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "apps/ftcs/leap_seconds.h"
+#include "apps/ftcs/log.h"
+#include "ftcs/platform/kernel_clock.h"
+#include "ftcs/platform/kernel_time_status.h"
+#include "ftcs/platform/wake_timer.h"
+#include "ftcs/servo/servo.h"
+
+namespace ftcs::app {
+
+/// What the reference says about its timescale.
+struct ReferenceScale {
+  bool tai = true;                  ///< false: whatever it is, it is taken as it stands
+  std::optional<int> utc_offset{};  ///< TAI - UTC, if it vouches for it
+  int leap = 0;                     ///< at the end of this UTC day: +1, -1, 0 none
+};
+
+/// Where UTC comes from when the reference does not tell, and who makes a leap.
+struct UtcConfig {
+  int utc_offset = 37;  ///< TAI - UTC since 2017
+  std::optional<LeapSeconds> leap_seconds{};
+  bool kernel_leap = true;  ///< the kernel makes it (STA_INS, STA_DEL); false: we set the clock
+};
+
+/// A clock of the kernel in an event loop: wakes it to end corrections, follows UTC and leap
+/// seconds, tells the kernel and the user what happens.
+class RealClock {
+ public:
+  RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc);
+
+  [[nodiscard]] platform::KernelClock& clock() { return clock_; }
+  [[nodiscard]] const std::string& name() const { return clock_.device().name(); }
+  [[nodiscard]] bool is_system() const { return clock_.device().is_system(); }
+
+  /// To be polled for reading, together with whatever the loop waits for.
+  [[nodiscard]] int wake_descriptor() const { return timer_.descriptor(); }
+  /// Before each wait.
+  void before_wait();
+  /// When wake_descriptor() can be read.
+  void on_wake();
+
+  void set_reference_scale(const ReferenceScale& scale);
+  /// Once per turn of the loop; returns why the run must end, if it must. `steering`: a command has
+  /// been applied, so that the clock is ours to describe.
+  [[nodiscard]] std::optional<std::string> attend(bool steering, bool locked,
+                                                  const ServoSnapshot& servo);
+  /// Before the program ends: the clock keeps its last good rate.
+  void stop();
+
+ private:
+  void report_foreign();
+  void follow_leap(bool steering);
+  void leap_is_done();
+  void publish(bool locked, const ServoSnapshot& servo);
+  [[nodiscard]] int armed_leap(std::int64_t utc_s) const;
+
+  platform::Kernel& kernel_;
+  Log& log_;
+  platform::KernelClock clock_;
+  platform::WakeTimer timer_;
+  UtcConfig utc_;
+  ReferenceScale scale_{};
+  bool scale_known_ = false;
+  int armed_leap_ = 0;
+  std::int64_t armed_midnight_s_ = 0;  ///< UTC: when it is due
+  std::int64_t no_leap_before_s_ = 0;  ///< UTC
+  std::int64_t attended_raw_s_ = -1;
+  bool publish_failed_ = false;
+};
+
+/// "CLOCK_REALTIME: not permitted", for a log line.
+[[nodiscard]] std::string describe(const std::string& clock, ClockError error);
+
+}  // namespace ftcs::app

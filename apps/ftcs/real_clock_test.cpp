@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+// World: CLOCK_REALTIME of a fake kernel, 10 s before a UTC midnight, followed by a TAI reference.
+#include "apps/ftcs/real_clock.h"
+
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/platform/fake_clocks.h"
+
+namespace ftcs::app {
+namespace {
+
+using platform::ClockAccess;
+using platform::ClockDevice;
+using platform::FakeClocks;
+using platform::KernelClock;
+
+constexpr double kSecond = 1e9;
+constexpr std::int64_t kNewYear2024 = 1'704'067'200;  // the day before ends a month
+constexpr std::int64_t kJanuary2nd2024 = kNewYear2024 + 86'400;
+
+class RealClockTest : public testing::Test {
+ protected:
+  void start(std::int64_t midnight, bool kernel_leap = true) {
+    kernel.system.time_ns =
+        static_cast<double>(midnight * 1'000'000'000 - FakeClocks::kEpoch) - 10 * kSecond;
+    UtcConfig utc;
+    utc.kernel_leap = kernel_leap;
+    auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+    real = std::make_unique<RealClock>(kernel, log, KernelClock(std::move(*device)), utc);
+  }
+  void steer() { ASSERT_TRUE(real->clock().apply({Rate{}, Duration{}, Rate{}, Duration{}}).ok()); }
+  /// Runs the loop for some seconds; the kernel leaps at midnight if it was asked to.
+  void run(int seconds, std::int64_t midnight) {
+    for (int i = 0; i < 10 * seconds; ++i) {
+      kernel.run(0.1 * kSecond);
+      const double since = kernel.system.time_ns -
+                           static_cast<double>(midnight * 1'000'000'000 - FakeClocks::kEpoch);
+      if (since >= 0.0 && (kernel.system.status & STA_INS) != 0 && !leapt) {
+        kernel.system.time_ns -= kSecond;
+        leapt = true;
+      }
+      if (since >= -kSecond && (kernel.system.status & STA_DEL) != 0 && !leapt) {
+        kernel.system.time_ns += kSecond;
+        leapt = true;
+      }
+      EXPECT_FALSE(real->attend(true, true, {}).has_value());
+    }
+  }
+  /// How much less UTC than TAI has passed.
+  [[nodiscard]] double lost_seconds(double ideal_start, double utc_start) const {
+    return ((kernel.ideal_ns - ideal_start) - (kernel.system.time_ns - utc_start)) / kSecond;
+  }
+
+  FakeClocks kernel;
+  Log log{kernel, stdout, 3};
+  std::unique_ptr<RealClock> real;
+  bool leapt = false;
+};
+
+TEST_F(RealClockTest, local_time_is_tai_by_the_offset_of_the_reference) {
+  start(kNewYear2024);
+  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  const double utc_ns = kernel.system.time_ns;
+  EXPECT_NEAR(
+      (real->clock().read().local.since_epoch() - Duration::from_whole_ns(FakeClocks::kEpoch)).ns(),
+      utc_ns + 37 * kSecond, 1e4);
+  real->set_reference_scale({.tai = false});
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{});
+}
+
+TEST_F(RealClockTest, a_leap_of_the_kernel_leaves_local_time_alone) {
+  for (const int leap : {1, -1}) {
+    for (const bool kernel_leap : {true, false}) {
+      kernel.held_names.clear();
+      leapt = false;
+      start(kNewYear2024, kernel_leap);
+      real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = leap});
+      steer();
+      const double ideal = kernel.ideal_ns;
+      const double utc = kernel.system.time_ns;
+      const ClockReading before = real->clock().read();
+      run(20, kNewYear2024);
+      EXPECT_EQ(leapt, kernel_leap);
+      EXPECT_NEAR(lost_seconds(ideal, utc), leap, 1e-3);
+      EXPECT_NEAR((real->clock().read().local - before.local).ns(), kernel.ideal_ns - ideal, 1e4);
+      EXPECT_EQ(real->clock().timescale_offset(),
+                Duration{Nanoseconds{std::chrono::seconds{37 + leap}}});
+      EXPECT_EQ(kernel.system.tai, 37 + leap);
+      EXPECT_EQ(kernel.system.status & (STA_INS | STA_DEL), 0) << "nothing stays armed";
+      // The reference says so a little later, and nothing more happens.
+      real->set_reference_scale({.tai = true, .utc_offset = 37 + leap});
+      EXPECT_NEAR(lost_seconds(ideal, utc), leap, 1e-3);
+    }
+  }
+}
+
+TEST_F(RealClockTest, a_reference_that_is_ahead_of_the_leap_does_not_undo_it) {
+  start(kNewYear2024);
+  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  steer();
+  run(5, kNewYear2024);
+  ASSERT_NE(kernel.system.status & STA_INS, 0);
+  real->set_reference_scale({.tai = true, .utc_offset = 38});  // its midnight was a little earlier
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
+}
+
+TEST_F(RealClockTest, a_leap_flag_on_a_day_without_leap_seconds_is_not_believed) {
+  start(kJanuary2nd2024);
+  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  steer();
+  run(20, kJanuary2nd2024);
+  EXPECT_FALSE(leapt);
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
+}
+
+TEST_F(RealClockTest, the_kernel_is_told_only_once_the_clock_is_steered) {
+  start(kNewYear2024);
+  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  EXPECT_FALSE(real->attend(false, false, {}).has_value());
+  EXPECT_EQ(kernel.commands, 0);
+  ServoSnapshot servo;
+  servo.offset = Nanoseconds{-2'500};
+  servo.offset_sigma_ns = 400.0;
+  servo.path_delay = Nanoseconds{10'000};
+  kernel.run(2 * kSecond);
+  EXPECT_FALSE(real->attend(true, true, servo).has_value());
+  EXPECT_EQ(kernel.system.status, 0) << "STA_UNSYNC cleared";
+  EXPECT_EQ(kernel.system.esterror, 3);
+  EXPECT_EQ(kernel.system.maxerror, 14);
+  kernel.run(2 * kSecond);
+  EXPECT_FALSE(real->attend(true, false, servo).has_value());
+  EXPECT_EQ(kernel.system.status, STA_UNSYNC);
+}
+
+TEST_F(RealClockTest, a_device_that_is_gone_ends_the_run) {
+  auto device = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kSteer);
+  RealClock phc(kernel, log, KernelClock(std::move(*device)), {});
+  EXPECT_FALSE(phc.attend(true, true, {}).has_value());
+  kernel.phc_gone = true;
+  kernel.run(2 * kSecond);
+  (void)phc.clock().read();
+  const auto reason = phc.attend(true, true, {});
+  ASSERT_TRUE(reason.has_value());
+  EXPECT_EQ(*reason, "/dev/ptp0: the device is gone");
+  phc.stop();
+}
+
+}  // namespace
+}  // namespace ftcs::app
