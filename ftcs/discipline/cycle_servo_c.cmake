@@ -6,8 +6,10 @@ set(ftcs_cycle_sources ftcs_cycle_servo.cpp
   ${PROJECT_SOURCE_DIR}/ftcs/servo/pics_servo.cpp)
 function(ftcs_cycle_library name)
   add_library(${name} STATIC ${ftcs_cycle_sources} ${ARGN})
-  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
-  target_link_libraries(${name} PRIVATE ftcs_warnings ftcs_realtime)
+  add_library(ftcs::${name} ALIAS ${name})
+  target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:ftcs_warnings> $<BUILD_INTERFACE:ftcs_realtime>)
   # A sanitizer's run-time library is what a C program would have to do without.
   target_compile_options(${name} PRIVATE -fno-threadsafe-statics -fno-sanitize=all)
 endfunction()

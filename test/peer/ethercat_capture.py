@@ -10,8 +10,9 @@ import struct
 import sys
 
 LRD, LRW, FPRD, FRMW = 10, 12, 4, 14
-LOCK_NS = 30_000  # the design's measure for jittery hosts: a running median of 51 frames that stays within it
+LOCK_NS = 30_000  # for jittery hosts: a running median of 51 frames that stays within it for a second of 1 ms
 MEDIAN = 51
+STAYS = 1000
 
 
 def datagrams(path):
@@ -66,10 +67,12 @@ def phase(path, cycle, shift):
     centre = quantile(errors[half:], 0.5)
     out = [i for i in range(len(errors) - MEDIAN)
            if abs(sorted(errors[i:i + MEDIAN])[MEDIAN // 2] - centre) > LOCK_NS]
-    lock = out[-1] + 1 if out else 0
+    lock = next((before + 1 for before, after in zip([-1, *out], [*out, len(errors)]) if after - before > STAYS), half)
+    later = sum(i > lock for i in out)
     scatter = [abs(error - centre) for error in errors[half:]]
     locked = lock < half
-    settled = f"settled (median of {MEDIAN} within 30 us) from frame {lock} on" if locked else "not settled in the first half"
+    settled = (f"settled (median of {MEDIAN} within 30 us) from frame {lock} on, outside again for {later}" if locked
+               else "not settled in the first half")
     print(f"frames on the wire: {len(errors)}, first {errors[0] / 1000:+.1f} us, {settled}; centre {centre / 1000:+.1f} us, "
           f"second half about it p50 {quantile(scatter, 0.5) / 1000:.1f} p90 {quantile(scatter, 0.9) / 1000:.1f} p99 "
           f"{quantile(scatter, 0.99) / 1000:.1f} us")

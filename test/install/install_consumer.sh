@@ -1,0 +1,32 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# Installs a built tree into a folder of its own and uses it from there: the program runs, a C project finds the library with
+# find_package() and with pkg-config, links no C++ run-time library, and locks.
+set -eu
+
+build=$(realpath "$1")
+here=$(dirname "$(realpath "$0")")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+cmake --install "$build" --prefix "$work/prefix" > "$work/log" || { cat "$work/log"; exit 1; }
+mv "$work/prefix" "$work/moved"  # nothing may remember where it was installed
+"$work/moved/bin/ftcs" --version
+
+cp -r "$here/consumer" "$work/consumer"
+cmake -S "$work/consumer" -B "$work/consumer/build" -DCMAKE_PREFIX_PATH="$work/moved" > "$work/log" 2>&1 &&
+  cmake --build "$work/consumer/build" >> "$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+for library in ftcs_cycle_servo ftcs_cycle_servo_small; do
+  program=$work/consumer/build/uses_$library
+  "$program"
+  if ldd "$program" | grep -q 'libstdc++'; then echo "$library: a C program links the C++ library" >&2; exit 1; fi
+done
+
+command -v pkg-config > /dev/null || { echo "no pkg-config here: not tried"; exit 0; }
+PKG_CONFIG_PATH=$(dirname "$(find "$work/moved" -name ftcs_cycle_servo.pc)")
+export PKG_CONFIG_PATH
+for library in ftcs_cycle_servo ftcs_cycle_servo_small; do
+  # shellcheck disable=SC2046
+  ${CC:-cc} -std=c99 -o "$work/$library" "$here/consumer/main.c" $(pkg-config --cflags --libs "$library")
+  "$work/$library"
+done
