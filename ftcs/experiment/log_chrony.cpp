@@ -34,7 +34,7 @@ std::optional<std::int64_t> parse_date(std::string_view date, std::string_view t
                                         std::chrono::day{static_cast<unsigned>((*ymd)[2])}};
   if (!day.ok()) return std::nullopt;
   const std::int64_t days = std::chrono::sys_days{day}.time_since_epoch().count();
-  return days * 86'400 + (*hms)[0] * 3600 + (*hms)[1] * 60 + (*hms)[2];
+  return days * 86'400 + (*hms)[0] * std::int64_t{3600} + (*hms)[1] * std::int64_t{60} + (*hms)[2];
 }
 
 struct ChronyLine {

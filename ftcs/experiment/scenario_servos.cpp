@@ -55,11 +55,11 @@ std::optional<ScenarioServo> named_servo(const std::string& name, const Scenario
 }
 
 const std::vector<std::string>& all_servos() {
-  static const std::vector<std::string> kAll = {
+  static const std::vector<std::string> names = {
       "adaptive",    "ftcs",       "ftcs-p1", "pics",
       "linuxptp-pi", "regression", "pid",     "frequency-compensated",
       "kalman"};
-  return kAll;
+  return names;
 }
 
 std::string known_names() {

@@ -63,10 +63,11 @@ void put_fixed_part(SiiImage& image, const Identity& identity, std::uint16_t ali
   put_word(image, 0x02, 0x03E8);  // SYNC impulse 10 us
   put_word(image, sii::kAliasWord, alias);
   put_word(image, sii::kChecksumWord, sii_checksum(image));
-  store(Bytes{image}, 0x08 * 2, identity.vendor);
-  store(Bytes{image}, 0x0A * 2, identity.product);
-  store(Bytes{image}, 0x0C * 2, identity.revision);
-  store(Bytes{image}, 0x0E * 2, identity.serial);
+  // In bytes: the words 0x08, 0x0A, 0x0C, 0x0E.
+  store(Bytes{image}, 0x10, identity.vendor);
+  store(Bytes{image}, 0x14, identity.product);
+  store(Bytes{image}, 0x18, identity.revision);
+  store(Bytes{image}, 0x1C, identity.serial);
   // Bootstrap and standard mailboxes are the same windows.
   for (const std::size_t at : {std::size_t{0x14}, sii::kMailboxWord}) {
     put_word(image, at, 0x1000);
