@@ -30,3 +30,8 @@ for library in ftcs_cycle_servo ftcs_cycle_servo_small; do
   ${CC:-cc} -std=c99 -o "$work/$library" "$here/consumer/main.c" $(pkg-config --cflags --libs "$library")
   "$work/$library"
 done
+# Into a shared object, as LinuxCNC's drivers are: whole, and with nothing left undefined.
+# shellcheck disable=SC2046
+${CC:-cc} -shared -Wl,-z,defs -Wl,--whole-archive $(pkg-config --libs ftcs_cycle_servo) -Wl,--no-whole-archive \
+  -o "$work/driver.so"
+echo "linked into a shared object"

@@ -48,13 +48,11 @@ def quantile(values, share):
 
 
 def cyclic_part(times, cycle):
-    """The longest run of frames that are about a cycle apart: bring-up and shut-down are not."""
-    best = run = (0, 1)
-    for i in range(1, len(times)):
-        regular = 0 < times[i] - times[i - 1] < 20 * cycle
-        run = (run[0], i + 1) if regular else (i, i + 1)
-        best = max(best, run, key=lambda part: part[1] - part[0])
-    return times[best[0]:best[1]]
+    """From the first to the last frame around which frames are a cycle apart: bring-up and drift pulses are not."""
+    gaps = [after - before for before, after in zip(times, times[1:])]
+    regular = [i for i in range(len(gaps) - MEDIAN)
+               if cycle // 2 < sorted(gaps[i:i + MEDIAN])[MEDIAN // 2] < 2 * cycle]
+    return times[regular[0]:regular[-1] + MEDIAN] if regular else []
 
 
 def phase(path, cycle, shift):

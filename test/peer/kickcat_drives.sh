@@ -1,10 +1,11 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # KickCAT at both ends. Its simulator's eight CiA 402 drives: our MainDevice scans them, with the delays that it emulates (300 ns
-# a hop), and brings them to OP. Its master (ds402_sinus) moves a drive of our segment. tshark decodes all frames.
+# a hop), and brings them to OP. Its master (ds402_sinus) moves a drive of our segment, and runs all eight with SYNC0 and its own
+# soft PLL (kickcat_dc.cpp, compiled against KickCAT). tshark decodes all frames.
 #
 # KICKCAT_PATH=build folder of KickCAT [KICKCAT_DRIVE=configuration of a simulated drive]   test/peer/kickcat_drives.sh [build/ftcs]
-# Skipped (77) without it. KickCAT is never part of this project: separate programs.
+# Skipped (77) without it. KickCAT is never part of this project; what is compiled here against it is gone after the test.
 # shellcheck source=test/peer/ethercat_common.sh
 . "$(dirname "$0")/ethercat_common.sh"
 
@@ -59,6 +60,24 @@ moved=$("$here/ethercat_capture.py" range "$capture" 11)
 echo "ds402_sinus: our drive's actual position went from ${moved/ / to } counts, asked for -11650 to 11650"
 python3 -c "import sys; sys.exit(not all(11400 < abs(int(end)) < 11660 for end in '$moved'.split()))" ||
   fail "our drive did not follow KickCAT's sine"
-stop_segment
-cat "$folder/segment.log"
+check_drives SAFEOP 0x001B 8
+
+source=$(sed -n 's/^KickCAT_SOURCE_DIR:STATIC=//p' "$KICKCAT_PATH/CMakeCache.txt" 2> /dev/null)
+if [ ! -e "$source/lib/master/include/kickcat/Bus.h" ] || ! command -v "${CXX:=c++}" > /dev/null; then
+  echo "no KickCAT headers or no compiler: its master with SYNC0 is not tried"
+  finish
+  exit
+fi
+"$CXX" -std=c++17 -O1 -Wall -Wextra -Werror -isystem "$source/lib/include" -isystem "$source/lib/master/include" \
+  -isystem "$source/lib/slave/include" "$here/kickcat_dc.cpp" "$KICKCAT_PATH/lib/libkickcat.a" -ltinyxml2 -lpthread -lrt \
+  -o "$folder/kickcat_dc" || { fail "kickcat_dc.cpp does not compile against KickCAT"; finish; exit; }
+start_segment "$ftcs" ethercat-segment -i ev1 --drives 8 --priority 70
+start_capture kickcat_dc
+at_main 60 chrt -f 60 "$folder/kickcat_dc" ev0 10 > "$folder/dc.log" 2>&1 || fail "KickCAT's master with SYNC0: exit code $?"
+grep "^KickCAT: 8 SubDevices" "$folder/dc.log" || cat "$folder/dc.log"
+check_capture kickcat_dc
+"$here/ethercat_capture.py" phase "$capture" 1000000 0 || [ $? -eq 3 ] || fail "no cyclic frames"
+# SYNC0 goes on when it has stopped: the drives raise what real ones would.
+check_drives SAFEOP 0x001A 8
+grep "^drive  0" "$folder/segment.log"
 finish

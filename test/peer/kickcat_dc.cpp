@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// KickCAT's MainDevice with distributed clocks, for kickcat_drives.sh: brings every SubDevice of an
+// interface to OP with SYNC0 every millisecond and follows their clock with KickCAT's own soft PLL.
+// Compiled against KickCAT where it is; no part of any other target.
+//
+//   kickcat_dc INTERFACE SECONDS     Exit code 0: in OP to the end, clocks within 1 us, PLL locked.
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <memory>
+#include <vector>
+
+#include "kickcat/Bus.h"
+#include "kickcat/CoE/CiA/DS402/Drive.h"
+#include "kickcat/Link.h"
+#include "kickcat/OS/Timer.h"
+#include "kickcat/helpers.h"
+
+using namespace kickcat;
+
+namespace {
+
+int run(const char* interface, double seconds) {
+  auto [nominal, redundancy] = createSockets(interface, "");
+  auto link = std::make_shared<Link>(nominal, redundancy, [] {});
+  link->setTimeout(2ms);
+  Bus bus{link};
+  std::vector<uint8_t> image(4096);
+  bus.init(100ms);
+  const nanoseconds start = bus.enableDC(1ms, 500us, 1s);
+  bus.requestState(State::PRE_OP);
+  bus.waitForState(State::PRE_OP, 3000ms);
+  std::vector<std::unique_ptr<CoE::CiA::DS402::Drive>> drives;
+  for (auto& slave : bus.slaves()) {
+    drives.push_back(std::make_unique<CoE::CiA::DS402::Drive>(bus, slave));
+    drives.back()->configure(CoE::CiA::DS402::control::POSITION_CYCLIC);
+    drives.back()->setInterpolationTimePeriod(1, -3);
+  }
+  bus.createMapping(image.data(), image.size());
+  bus.requestState(State::SAFE_OP);
+  bus.waitForState(State::SAFE_OP, 1000ms);
+  for (auto& drive : drives) drive->attach();
+
+  Timer timer{1ms};
+  timer.start(start);
+  long bad = 0;
+  const auto on_error = [&bad](const DatagramState&) { ++bad; };
+  const long cycles = static_cast<long>(seconds * 1000);
+  long locked_at = -1;
+  std::size_t operational = 0;
+  for (long cycle = 0; cycle < cycles; ++cycle) {
+    static_cast<void>(timer.wait_next_tick());
+    try {
+      bus.sendLogicalRead(on_error);
+      bus.sendLogicalWrite(on_error);
+      bus.finalizeDatagrams();
+      bus.processAwaitingFrames();
+      // Half a second of outputs at SYNC0 before OP is asked for.
+      if (cycle == 500) bus.requestState(State::OPERATIONAL);
+      if (cycle == 1000) {
+        for (auto& drive : drives) drive->enable();
+      }
+      // One a cycle: drives that wait for outputs meanwhile would fault, and rightly so.
+      const long left = cycles - 1 - cycle;
+      if (left < static_cast<long>(drives.size())) {
+        operational += bus.getCurrentState(bus.slaves().at(static_cast<std::size_t>(left))) ==
+                       State::OPERATIONAL;
+      }
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "[%ld] %s\n", cycle, error.what());
+    }
+    for (auto& drive : drives) drive->update();
+    bus.sync(timer);
+    if (timer.locked() && locked_at < 0) locked_at = cycle;
+  }
+  const bool synchronized = bus.isDCSynchronized(1000ns);
+  bool enabled = true;
+  for (auto& drive : drives) enabled &= drive->isEnabled();
+  std::printf(
+      "KickCAT: %zu SubDevices, %zu in OP at the end, enabled %s, clocks within 1 us %s, soft PLL "
+      "locked in cycle %ld, "
+      "%ld datagrams without their working counter in %ld cycles\n",
+      bus.slaves().size(), operational, enabled ? "yes" : "no", synchronized ? "yes" : "no",
+      locked_at, bad, cycles);
+  return operational == drives.size() && enabled && synchronized && locked_at >= 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: kickcat_dc INTERFACE SECONDS\n");
+    return 2;
+  }
+  try {
+    return run(argv[1], std::atof(argv[2]));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "kickcat_dc: %s\n", error.what());
+    return 1;
+  }
+}
