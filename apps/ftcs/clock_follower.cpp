@@ -34,6 +34,8 @@ StepPolicy step_policy(const PtpOptions& options) {
 DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps) {
   DisciplineConfig config;
   config.servo = options.servo;
+  // Peer to peer: the delay is added to the reference before the servo sees a pair.
+  if (options.peer_to_peer()) config.servo.two_way.fixed_path_delay = Nanoseconds{0};
   config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
   config.servo.linuxptp_pi.step_threshold = options.step_threshold;
   config.servo.linuxptp_pi.timestamping =
@@ -53,12 +55,16 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
       clock_(clock),
       start_(start),
       label_(std::move(label)),
-      discipline_(discipline_config(options, hardware_stamps), clock) {}
+      discipline_(discipline_config(options, hardware_stamps), clock),
+      link_delay_(options.servo.two_way.path_delay) {}
 
-std::optional<std::string> ClockFollower::on_pair(const EventPair& pair, FreeRunningTime now,
+std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, FreeRunningTime now,
                                                   std::optional<Duration> sync_interval) {
+  if (options_.peer_to_peer() && !link_delay_.known()) return std::nullopt;
+  EventPair pair = emitted;
+  pair.reference = pair.reference + link_delay_.value();
   const LocalTime local = clock_.local_at(pair.free_running);
-  const Telemetry telemetry = discipline_.on_pair(pair);
+  Telemetry telemetry = discipline_.on_pair(pair);
   if (telemetry.error) {
     if (auto wrong = on_clock_error(*telemetry.error)) return wrong;
   }
@@ -74,6 +80,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& pair, FreeRun
   const bool forward = pair.direction == Direction::kForward;
   const Duration perceived =
       offset_from_reference(local, pair.reference + telemetry.servo.path_delay);
+  telemetry.servo.path_delay += link_delay_.value();
   if (!used) {
     const bool known = forward && telemetry.servo.offset_known;
     note_refusal(telemetry, time_s, known ? std::optional(perceived.ns()) : std::nullopt);

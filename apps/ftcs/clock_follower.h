@@ -10,6 +10,7 @@
 #include "apps/ftcs/ptp_options.h"
 #include "apps/ftcs/sample_report.h"
 #include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/measurement/link_delay.h"
 
 namespace ftcs::app {
 
@@ -24,6 +25,11 @@ class ClockFollower {
   /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
   [[nodiscard]] std::optional<std::string> on_pair(const EventPair& pair, FreeRunningTime now,
                                                    std::optional<Duration> sync_interval);
+  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, pairs are
+  /// left out. `first`: of another link.
+  void on_link_delay(Duration mean_link_delay, bool first) {
+    (void)link_delay_.add(mean_link_delay, first);
+  }
   /// Once per turn of the loop.
   void on_silence();
   /// Another reference: what was learnt about the old one is void.
@@ -67,6 +73,7 @@ class ClockFollower {
   FreeRunningTime start_;
   std::string label_;
   ClockDiscipline discipline_;
+  LinkDelay link_delay_;
   SampleSummary recent_;
   SampleSummary since_lock_;
   bool in_holdover_ = false;

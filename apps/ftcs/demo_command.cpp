@@ -24,9 +24,7 @@ std::optional<platform::OsError> port_in_use(platform::Kernel& kernel, std::uint
     const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
     if (fd < 0) return platform::os_error(-fd, "socket");
     const platform::Descriptor socket(kernel, fd);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    const auto address = platform::SocketAddress::ipv4({}, static_cast<std::uint16_t>(port));
     const int result = kernel.bind(fd, address);
     if (result < 0) return platform::os_error(-result, fmt::format("UDP port {}", port));
   }

@@ -5,6 +5,7 @@
 
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/ptp_option_table.h"
+#include "apps/ftcs/ptp_presets.h"
 #include "ftcs/servo/any_servo.h"
 
 namespace ftcs::app {
@@ -63,16 +64,15 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
   flags.setting("-l", "logging_level", arguments, "LEVEL", "log level, 0 to 7; default 6");
   flags.accept("-m", "accepted: messages always go to standard output");
   flags.accept("-q", "accepted: messages never go to the system log");
-  flags.shorthand("-E", "delay_mechanism", "E2E", arguments, "end-to-end delay (the only one)");
+  flags.shorthand("-E", "delay_mechanism", "E2E", arguments, "end-to-end delay (default)");
+  flags.shorthand("-P", "delay_mechanism", "P2P", arguments, "peer-to-peer delay");
   flags.shorthand("-A", "delay_mechanism", "E2E", arguments, "accepted as -E");
-  flags.shorthand("-4", "network_transport", "UDPv4", arguments,
-                  "UDP over IPv4 (the only transport)");
+  flags.shorthand("-2", "network_transport", "L2", arguments, "IEEE 802.3, without IP");
+  flags.shorthand("-4", "network_transport", "UDPv4", arguments, "UDP over IPv4 (default)");
+  flags.shorthand("-6", "network_transport", "UDPv6", arguments, "UDP over IPv6");
   auto* hardware = flags.given("-H", arguments.hardware, "hardware time stamping or an error");
   auto* software = flags.given("-S", arguments.software, "software time stamping or an error");
   hardware->excludes(software);
-  flags.refuse("-P", "the peer delay mechanism is not supported");
-  flags.refuse("-2", "transport over IEEE 802.3 is not supported");
-  flags.refuse("-6", "transport over UDP/IPv6 is not supported");
   flags.refuse("-L", "legacy time stamping is not supported");
   flags.value("-p", arguments.clock, "DEVICE", "PTP hardware clock to steer, as --clock DEVICE");
 }
@@ -121,7 +121,16 @@ void add_network_flags(CLI::App& command, PtpArguments& arguments) {
       ->check(integer_from(1, 65'535));
   flags.value("--general-port", arguments.general_port, "PORT", "UDP port; default 320")
       ->check(integer_from(1, 65'535));
-  flags.value("--unicast", arguments.unicast, "ADDRESS", "IPv4 address of the only peer");
+  flags.value("--unicast", arguments.unicast, "ADDRESS",
+              "the only peer: an IPv4, IPv6 or Ethernet address");
+  flags.value("--preset", arguments.preset, "NAME",
+              preset_names() + ": settings that belong together");
+  flags
+      .value("--acceptable-transmitter", arguments.acceptable, "ID",
+             "follow only these clocks, for example 001b21.fffe.a1b2c3; up to 16")
+      ->delimiter(',');
+  flags.given("--no-fast-start", arguments.no_fast_start,
+              "wait for a second Announce before measuring, as IEEE 1588 has it");
 }
 
 }  // namespace

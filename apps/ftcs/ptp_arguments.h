@@ -35,6 +35,9 @@ struct PtpArguments {
   std::optional<std::uint16_t> event_port;
   std::optional<std::uint16_t> general_port;
   std::string unicast;
+  std::string preset;
+  std::vector<std::string> acceptable;
+  bool no_fast_start = false;
   std::optional<double> duration_s;
 };
 

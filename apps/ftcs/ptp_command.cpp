@@ -10,6 +10,7 @@
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_port.h"
+#include "apps/ftcs/ptp_presets.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/platform/network_interface.h"
 
@@ -101,6 +102,31 @@ Wrong apply_clock(const PtpArguments& arguments, PtpOptions& options) {
   return std::nullopt;
 }
 
+Wrong apply_peer(const PtpArguments& arguments, PtpOptions& options) {
+  using platform::NetworkTransport;
+  if (arguments.unicast.empty()) return std::nullopt;
+  const NetworkTransport transport = options.socket.transport;
+  options.socket.unicast = platform::parse_peer(transport, arguments.unicast);
+  if (options.hybrid) return "--unicast and hybrid_e2e exclude each other";
+  if (options.socket.unicast) return std::nullopt;
+  const char* const kind = transport == NetworkTransport::kUdpIpv4   ? "an IPv4"
+                           : transport == NetworkTransport::kUdpIpv6 ? "an IPv6"
+                                                                     : "an Ethernet";
+  return fmt::format("--unicast: '{}' is not {} address", arguments.unicast, kind);
+}
+
+Wrong apply_trust(const PtpArguments& arguments, PtpOptions& options) {
+  for (const std::string& text : arguments.acceptable) {
+    const auto identity = parse_clock_identity(text);
+    if (!identity) {
+      return fmt::format("--acceptable-transmitter: '{}': expected 001122.fffe.334455", text);
+    }
+    if (!options.acceptable.add(*identity)) return "--acceptable-transmitter: more than 16 clocks";
+  }
+  if (arguments.no_fast_start) options.fast_start = false;
+  return std::nullopt;
+}
+
 Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
   if (arguments.interfaces.size() > 1) return "-i: only one port is supported";
   if (!arguments.interfaces.empty()) {
@@ -118,13 +144,7 @@ Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
   if (options.socket.event_port == options.socket.general_port) {
     return "--event-port and --general-port must differ";
   }
-  if (!arguments.unicast.empty()) {
-    options.socket.unicast = platform::parse_ipv4(arguments.unicast);
-    if (!options.socket.unicast) {
-      return fmt::format("--unicast: '{}' is not an IPv4 address", arguments.unicast);
-    }
-  }
-  return std::nullopt;
+  return apply_peer(arguments, options);
 }
 
 Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
@@ -145,13 +165,16 @@ Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
 }
 
 Wrong make_options(const PtpArguments& arguments, PtpOptions& options) {
+  if (!arguments.preset.empty()) {
+    if (auto wrong = apply_preset(options, arguments.preset)) return "--preset: " + *wrong;
+  }
   if (!arguments.config_file.empty()) {
     if (auto wrong = read_config_file(arguments.config_file, options)) return wrong;
   }
   for (const auto& [name, value] : arguments.settings) {
     if (auto wrong = apply_setting(options, name, value)) return "--" + *wrong;
   }
-  for (const auto step : {apply_role, apply_network, apply_clock, apply_servo}) {
+  for (const auto step : {apply_role, apply_network, apply_trust, apply_clock, apply_servo}) {
     if (auto wrong = step(arguments, options)) return wrong;
   }
   return std::nullopt;

@@ -57,19 +57,42 @@ Wrong only(std::string_view text, std::string_view supported) {
 Wrong interval(std::string_view text, std::int8_t& target) { return integer(text, target, -7, 7); }
 
 Wrong set_identity(PtpOptions& options, std::string_view text) {
-  std::string digits;
-  for (const char c : text) {
-    if (c != '.' && c != ':') digits.push_back(c);
+  const auto identity = parse_clock_identity(text);
+  if (!identity) return fmt::format("'{}': expected 001122.fffe.334455", text);
+  if (*identity != ptp::ClockIdentity{}) options.clock_identity = identity;  // zero: the default
+  return std::nullopt;
+}
+
+Wrong set_delay_mechanism(PtpOptions& options, std::string_view text) {
+  if (text == "E2E") {
+    options.delay_mechanism = ptp::DelayMechanism::kEndToEnd;
+  } else if (text == "P2P") {
+    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  } else {
+    return fmt::format("'{}' is not supported, only E2E and P2P", text);
   }
-  ptp::ClockIdentity identity;
-  bool valid = digits.size() == 2 * identity.octets.size();
-  for (std::size_t i = 0; valid && i < identity.octets.size(); ++i) {
-    const auto octet = parse_integer("0x" + digits.substr(2 * i, 2), 0, 255);
-    valid = octet.ok();
-    if (valid) identity.octets[i] = static_cast<std::uint8_t>(*octet);
+  return std::nullopt;
+}
+
+Wrong set_transport(PtpOptions& options, std::string_view text) {
+  const auto transport = platform::transport_from_name(text);
+  if (!transport) return fmt::format("'{}' is not supported, only UDPv4, UDPv6 and L2", text);
+  options.socket.transport = *transport;
+  return std::nullopt;
+}
+
+Wrong mac(std::string_view text, platform::MacAddress& target) {
+  const auto address = platform::parse_mac(std::string(text));
+  if (!address) return fmt::format("'{}': expected 01:1B:19:00:00:00", text);
+  target = *address;
+  return std::nullopt;
+}
+
+Wrong set_capable(PtpOptions& options, std::string_view text) {
+  if (text != "auto" && text != "true") {
+    return fmt::format("'{}' is not supported, only auto and true", text);
   }
-  if (!valid) return fmt::format("'{}': expected 001122.fffe.334455", text);
-  if (identity != ptp::ClockIdentity{}) options.clock_identity = identity;  // zero: the default
+  options.always_capable = text == "true";
   return std::nullopt;
 }
 
@@ -177,8 +200,31 @@ constexpr std::array kSettings{
     PtpSetting{"udp_ttl", "1 to 255", FTCS_SET(integer(v, o.socket.ttl, 1, 255))},
     PtpSetting{"time_stamping", "hardware or software; default: the best available",
                set_time_stamping},
-    PtpSetting{"network_transport", "UDPv4", FTCS_SET((void(o), only(v, "UDPv4")))},
-    PtpSetting{"delay_mechanism", "E2E", FTCS_SET((void(o), only(v, "E2E")))},
+    PtpSetting{"network_transport", "UDPv4 (-4), UDPv6 (-6) or L2 (-2)", set_transport},
+    PtpSetting{"delay_mechanism", "E2E (-E) or P2P (-P)", set_delay_mechanism},
+    PtpSetting{"hybrid_e2e", "1: delay requests go to the transmitter's own address",
+               FTCS_SET(boolean(v, o.hybrid))},
+    PtpSetting{"logMinPdelayReqInterval", "log2 of seconds, -7 to 7",
+               FTCS_SET(interval(v, o.peer_delay.log_min_interval))},
+    PtpSetting{"neighborPropDelayThresh", "ns; above it the neighbour is not 802.1AS capable",
+               FTCS_SET(nanoseconds(v, o.peer_delay.highest))},
+    PtpSetting{"min_neighbor_prop_delay", "ns; below it the neighbour is not 802.1AS capable",
+               FTCS_SET(nanoseconds(v, o.peer_delay.lowest))},
+    PtpSetting{"asCapable", "auto or true", set_capable},
+    PtpSetting{"syncReceiptTimeout", "Sync intervals, 0 to 10; 0: never",
+               FTCS_SET(integer(v, o.sync_receipt_timeout, 0, 10))},
+    PtpSetting{"assume_two_step", "1: take every Sync for a two-step one",
+               FTCS_SET(boolean(v, o.assume_two_step))},
+    PtpSetting{"follow_up_info", "1: transmit the 802.1AS information in Follow_Up",
+               FTCS_SET(boolean(v, o.follow_up_info))},
+    PtpSetting{"path_trace_enabled", "1: transmit the path trace in Announce",
+               FTCS_SET(boolean(v, o.path_trace))},
+    PtpSetting{"ptp_dst_mac", "L2: where all but peer delay messages go",
+               FTCS_SET(mac(v, o.socket.primary_mac))},
+    PtpSetting{"p2p_dst_mac", "L2: where peer delay messages go",
+               FTCS_SET(mac(v, o.socket.peer_mac))},
+    PtpSetting{"udp6_scope", "UDPv6: scope of ff0X::181, 0x00 to 0x0F",
+               FTCS_SET(integer(v, o.socket.ipv6_scope, 0, 0xF))},
     PtpSetting{"clock_servo", "pi (as --servo linuxptp-pi)", set_clock_servo},
     PtpSetting{"kernel_leap", "1: the kernel makes leap seconds (system clock)",
                FTCS_SET(boolean(v, o.kernel_leap))},
@@ -235,21 +281,12 @@ constexpr std::array kFixed{
     Fixed{"maxStepsRemoved", "255"},
     Fixed{"operLogSyncInterval", kAny},       // automotive profile only
     Fixed{"operLogPdelayReqInterval", kAny},  // automotive profile only
-    Fixed{"logMinPdelayReqInterval", kAny},   // peer delay only
-    Fixed{"neighborPropDelayThresh", kAny},   // peer delay only
-    Fixed{"min_neighbor_prop_delay", kAny},   // peer delay only
-    Fixed{"syncReceiptTimeout", "0"},
-    Fixed{"fault_reset_interval", kAny},  // the port comes back by itself
-    Fixed{"asCapable", "auto"},
+    Fixed{"fault_reset_interval", kAny},      // the port comes back by itself
     Fixed{"BMCA", "ptp"},
     Fixed{"inhibit_announce", "0"},
     Fixed{"inhibit_delay_req", "0"},
     Fixed{"ignore_source_id", "0"},
     Fixed{"ignore_transport_specific", "0"},
-    Fixed{"assume_two_step", "0"},
-    Fixed{"path_trace_enabled", "0"},
-    Fixed{"follow_up_info", "0"},
-    Fixed{"hybrid_e2e", "0"},
     Fixed{"inhibit_multicast_service", "0"},
     Fixed{"net_sync_monitor", "0"},
     Fixed{"tc_spanning_tree", "0"},
@@ -266,9 +303,6 @@ constexpr std::array kFixed{
     Fixed{"servo_offset_threshold", "0"},
     Fixed{"write_phase_mode", "0"},
     Fixed{"step_window", "0"},
-    Fixed{"ptp_dst_mac", kAny},  // IEEE 802.3 only
-    Fixed{"p2p_dst_mac", kAny},  // IEEE 802.3 only
-    Fixed{"udp6_scope", kAny},   // IPv6 only
     Fixed{"uds_address", kAny},  // there is no management socket
     Fixed{"uds_ro_address", kAny},
     Fixed{"clock_type", "OC"},
@@ -281,6 +315,21 @@ constexpr std::array kFixed{
 };
 
 }  // namespace
+
+std::optional<ptp::ClockIdentity> parse_clock_identity(std::string_view text) {
+  std::string digits;
+  for (const char c : text) {
+    if (c != '.' && c != ':') digits.push_back(c);
+  }
+  ptp::ClockIdentity identity;
+  if (digits.size() != 2 * identity.octets.size()) return std::nullopt;
+  for (std::size_t i = 0; i < identity.octets.size(); ++i) {
+    const auto octet = parse_integer("0x" + digits.substr(2 * i, 2), 0, 255);
+    if (!octet.ok()) return std::nullopt;
+    identity.octets[i] = static_cast<std::uint8_t>(*octet);
+  }
+  return identity;
+}
 
 std::span<const PtpSetting> ptp_settings() { return kSettings; }
 

@@ -18,6 +18,9 @@ struct PtpSetting {
   std::optional<std::string> (*set)(PtpOptions& options, std::string_view value);
 };
 
+/// "001122.fffe.334455"
+[[nodiscard]] std::optional<ptp::ClockIdentity> parse_clock_identity(std::string_view text);
+
 /// The settings that have an effect.
 [[nodiscard]] std::span<const PtpSetting> ptp_settings();
 

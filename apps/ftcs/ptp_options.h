@@ -9,6 +9,8 @@
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/platform/ptp_socket.h"
 #include "ftcs/platform/timestamp_clock.h"
+#include "ftcs/ptp/acceptable_transmitters.h"
+#include "ftcs/ptp/peer_delay.h"
 #include "ftcs/ptp/wire/identity.h"
 #include "ftcs/ptp/wire/message.h"
 #include "ftcs/servo/any_servo.h"
@@ -53,6 +55,16 @@ struct PtpOptions {
   std::int8_t log_sync_interval = 0;
   std::int8_t log_min_delay_req_interval = 0;
   std::uint8_t announce_receipt_timeout = 3;
+  std::uint8_t sync_receipt_timeout = 0;
+  ptp::DelayMechanism delay_mechanism = ptp::DelayMechanism::kEndToEnd;
+  ptp::PeerDelayConfig peer_delay{};
+  bool always_capable = false;  ///< ptp4l's asCapable true: ask nothing of the neighbour
+  bool hybrid = false;          ///< ptp4l's hybrid_e2e
+  bool assume_two_step = false;
+  bool follow_up_info = false;
+  bool path_trace = false;
+  ptp::AcceptableTransmitters acceptable{};
+  bool fast_start = true;
   std::uint8_t priority1 = 128;
   std::uint8_t priority2 = 128;
   ptp::ClockQuality quality{};
@@ -84,6 +96,16 @@ struct PtpOptions {
 
   std::vector<std::string>
       notes;  ///< settings that mean less here than in ptp4l: logged at the start
+
+  [[nodiscard]] bool peer_to_peer() const {
+    return delay_mechanism == ptp::DelayMechanism::kPeerToPeer;
+  }
+  /// As ptp4l: a port that speaks IEEE 802.1AS (majorSdoId 1) asks whether its neighbour does.
+  [[nodiscard]] ptp::PeerDelayConfig peer_delay_config() const {
+    ptp::PeerDelayConfig config = peer_delay;
+    config.capability_needed = peer_to_peer() && major_sdo_id == 1 && !always_capable;
+    return config;
+  }
 };
 
 }  // namespace ftcs::app

@@ -76,6 +76,8 @@ void PtpPort::perform(const ptp::ActionList& actions) {
   for (const ptp::Action& action : actions) {
     if (const auto* message = std::get_if<ptp::SendMessage>(&action)) {
       send(*message);
+    } else if (std::holds_alternative<ptp::SenderIsTransmitter>(action)) {
+      transmitter_ = sender_;
     } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
       log_(LogLevel::kNotice, "port 1 ({}): {} to {} on {}", options_.interface,
            to_string(change->from), to_string(change->to), to_string(change->event));
@@ -105,14 +107,37 @@ void PtpPort::log_unusual(const ptp::Counters& counters) {
   if (!text.empty()) log_(LogLevel::kNotice, "counted besides: {}", text);
 }
 
+void PtpPort::log_peer_delay(const ptp::PeerDelay& peer_delay) {
+  const auto delay = peer_delay.mean_link_delay();
+  if (!delay) return;
+  log_(LogLevel::kNotice, "peer delay {:.0f} ns, the neighbour's clock {:+.0f} ppb against ours{}",
+       delay->ns(), peer_delay.neighbor_rate_ratio().ppb(),
+       peer_delay.capable() ? "" : ", not 802.1AS capable");
+}
+
 void PtpPort::fail(const std::string& reason) {
   if (!failure_) failure_ = reason;
 }
 
+std::optional<platform::OsError> PtpPort::hand_over(const ptp::SendMessage& message) {
+  using ptp::Destination;
+  const auto bytes = message.bytes.view();
+  switch (message.destination) {
+    case Destination::kSender:
+      return transport_.send_to(message.channel, bytes, sender_);
+    case Destination::kTransmitter:
+      return transport_.send_to(message.channel, bytes, transmitter_);
+    case Destination::kNeighbour:
+      return transport_.send(message.channel, bytes, platform::Group::kPeerDelay);
+    case Destination::kMulticast:
+    case Destination::kPeer:
+      break;
+  }
+  return transport_.send(message.channel, bytes);
+}
+
 void PtpPort::send(const ptp::SendMessage& message) {
-  const bool answer = message.destination == ptp::Destination::kSender;
-  const auto error = transport_.send(message.channel, message.bytes.view(),
-                                     answer ? sender_ : std::optional<in_addr>{});
+  const auto error = hand_over(message);
   if (error && !send_failed_) log_(LogLevel::kWarning, "{}", error->message());
   send_failed_ = error.has_value();  // one line for a series of failures
   if (error && message.channel == ptp::Channel::kEvent) unsent_.push_back(message.id());

@@ -19,6 +19,7 @@
 #include "ftcs/platform/timestamp_clock.h"
 #include "ftcs/ptp/actions.h"
 #include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/peer_delay.h"
 
 namespace ftcs::app {
 
@@ -56,6 +57,8 @@ class PtpPort : private platform::TransportHandler {
   void perform(const ptp::ActionList& actions);
   /// Everything that a port counted beside good messages, as one line; nothing if there is none.
   void log_unusual(const ptp::Counters& counters);
+  /// What the peer delay mechanism has measured, if it has.
+  void log_peer_delay(const ptp::PeerDelay& peer_delay);
   /// Ends run() with an error line.
   void fail(const std::string& reason);
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
@@ -77,6 +80,7 @@ class PtpPort : private platform::TransportHandler {
   void on_link(bool up, const std::string& reason) override;
   void on_readable(int descriptor) override;
   void send(const ptp::SendMessage& message);
+  [[nodiscard]] std::optional<platform::OsError> hand_over(const ptp::SendMessage& message);
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
 
@@ -88,7 +92,8 @@ class PtpPort : private platform::TransportHandler {
   VirtualClock virtual_clock_;
   RealClock* real_clock_;
   platform::PtpTransport transport_;
-  std::optional<in_addr> sender_{};  ///< of the message that is being handled
+  platform::SocketAddress sender_{};  ///< of the message that is being handled
+  platform::SocketAddress transmitter_{};
   std::optional<platform::StampSource> reported_stamps_{};
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take

@@ -20,6 +20,13 @@ ptp::TimeReceiverConfig core_config(const PtpOptions& options, const ptp::PortId
   config.announce_receipt_timeout = options.announce_receipt_timeout;
   config.log_min_delay_req_interval = options.log_min_delay_req_interval;
   config.unicast = options.socket.unicast.has_value();
+  config.hybrid = options.hybrid;
+  config.delay_mechanism = options.delay_mechanism;
+  config.peer_delay = options.peer_delay_config();
+  config.assume_two_step = options.assume_two_step;
+  config.sync_receipt_timeout = options.sync_receipt_timeout;
+  config.acceptable = options.acceptable;
+  config.fast_start = options.fast_start;
   config.delay_asymmetry = options.delay_asymmetry;
   config.seed = seed;
   return config;
@@ -54,6 +61,8 @@ ptp::ActionList PtpReceiver::start(FreeRunningTime now) {
 void PtpReceiver::act(const ptp::Action& action) {
   if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) {
     on_pair(emitted->pair);
+  } else if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
+    follower_.on_link_delay(delay->mean_link_delay, delay->first);
   } else if (const auto* seen = std::get_if<ptp::TransmitterSeen>(&action)) {
     log()(LogLevel::kNotice, "port 1 ({}): new foreign master {}", options().interface,
           to_text(seen->port).view());
@@ -109,6 +118,7 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
 
 int PtpReceiver::finish() {
   follower_.log_summary();
+  log_peer_delay(core().peer_delay());
   log_unusual(core().counters());
   return follower_.locked() ? kSuccess : kNotLocked;
 }

@@ -24,6 +24,11 @@ ptp::TimeTransmitterConfig core_config(const PtpOptions& options,
   config.utc_offset = options.utc_offset;
   config.time_source = options.time_source;
   config.unicast = options.socket.unicast.has_value();
+  config.delay_mechanism = options.delay_mechanism;
+  config.peer_delay = options.peer_delay_config();
+  config.assume_two_step = options.assume_two_step;
+  config.follow_up_info = options.follow_up_info;
+  config.path_trace = options.path_trace;
   return config;
 }
 
@@ -41,6 +46,7 @@ int PtpTransmitter::finish() {
   log()(LogLevel::kNotice, "summary: {}, {} Syncs sent, {} delay requests answered",
         transmitting ? "transmitting" : "not transmitting", counters[Counter::kSyncSent],
         counters[Counter::kDelayRespSent]);
+  log_peer_delay(core().peer_delay());
   log_unusual(counters);
   return transmitting ? kSuccess : kNotLocked;
 }

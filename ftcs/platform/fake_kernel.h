@@ -33,7 +33,9 @@ class FakeKernel : public Kernel {
     std::deque<Packet> received;
     std::deque<Packet> error_queue;
     std::uint16_t port = 0;
-    std::map<int, int> socket_options;  ///< SOL_SOCKET options of integer size
+    int family = AF_INET;
+    std::vector<std::pair<int, int>> options;  ///< level and name of every option set
+    std::map<int, int> socket_options;         ///< SOL_SOCKET options of integer size
   };
 
   // Clocks. Each reading of a clock takes reading_ns, as a real one does.
@@ -53,6 +55,7 @@ class FakeKernel : public Kernel {
 
   // Failures: errno, 0 = works.
   int bind_errno = 0;
+  int packet_socket_errno = 0;
   int send_errno = 0;
   int receive_errno = 0;  ///< reported once, as the kernel does
   int timestamping_errno = 0;
@@ -62,7 +65,7 @@ class FakeKernel : public Kernel {
 
   std::map<int, Socket> sockets;
   std::vector<Packet> sent;
-  sockaddr_in last_destination{};
+  SocketAddress last_destination{};
 
   /// Lets both clocks run on.
   void advance(std::int64_t ns) {
@@ -75,20 +78,23 @@ class FakeKernel : public Kernel {
     if (on_clock_read) on_clock_read();
     return clock == CLOCK_REALTIME ? realtime_ns : raw_ns;
   }
-  int socket(int, int type) noexcept override {
+  int socket(int family, int type) noexcept override {
     if (type != SOCK_DGRAM) return -EINVAL;
+    if (family == AF_PACKET && packet_socket_errno != 0) return -packet_socket_errno;
     sockets[next_descriptor_] = {};
+    sockets[next_descriptor_].family = family;
     return next_descriptor_++;
   }
-  int bind(int fd, const sockaddr_in& address) noexcept override {
+  int bind(int fd, const SocketAddress& address) noexcept override {
     if (bind_errno != 0) return -bind_errno;
-    sockets[fd].port = ntohs(address.sin_port);
+    sockets[fd].port = address.port();
     return 0;
   }
   int set_option(int fd, int level, int name, const void* value, socklen_t size) noexcept override {
     if (level == SOL_SOCKET && name == SO_TIMESTAMPING && timestamping_errno != 0) {
       return -timestamping_errno;
     }
+    sockets[fd].options.emplace_back(level, name);
     if (level == SOL_SOCKET && size == sizeof(int)) {
       std::memcpy(&sockets[fd].socket_options[name], value, sizeof(int));
     }
@@ -96,7 +102,7 @@ class FakeKernel : public Kernel {
   }
   int set_nonblocking(int) noexcept override { return 0; }
   ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
-                  const sockaddr_in& to) noexcept override {
+                  const SocketAddress& to) noexcept override {
     if (send_errno != 0) return -send_errno;
     last_destination = to;
     sent.push_back({{bytes.begin(), bytes.end()}, 0, 0});

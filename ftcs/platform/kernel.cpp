@@ -33,8 +33,8 @@ int LinuxKernel::socket(int domain, int type) noexcept {
   return or_errno(::socket(domain, type, 0));
 }
 
-int LinuxKernel::bind(int fd, const sockaddr_in& address) noexcept {
-  return or_errno(::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address));
+int LinuxKernel::bind(int fd, const SocketAddress& address) noexcept {
+  return or_errno(::bind(fd, address.get(), address.size()));
 }
 
 int LinuxKernel::set_option(int fd, int level, int name, const void* value,
@@ -48,9 +48,8 @@ int LinuxKernel::set_nonblocking(int fd) noexcept {
 }
 
 ssize_t LinuxKernel::send_to(int fd, std::span<const std::uint8_t> bytes,
-                             const sockaddr_in& to) noexcept {
-  return or_errno(::sendto(fd, bytes.data(), bytes.size(), 0,
-                           reinterpret_cast<const sockaddr*>(&to), sizeof to));
+                             const SocketAddress& to) noexcept {
+  return or_errno(::sendto(fd, bytes.data(), bytes.size(), 0, to.get(), to.size()));
 }
 
 ssize_t LinuxKernel::receive(int fd, msghdr& message, int flags) noexcept {

@@ -3,12 +3,13 @@
 
 #include <cstdint>
 #include <ctime>
-#include <netinet/in.h>
 #include <poll.h>
 #include <span>
 #include <sys/socket.h>
 #include <sys/timex.h>
 #include <sys/types.h>
+
+#include "ftcs/platform/socket_address.h"
 
 namespace ftcs::platform {
 
@@ -16,6 +17,7 @@ namespace ftcs::platform {
 ///
 /// A negative result is -errno. The set is kept to what a network simulator that replaces libc's
 /// calls offers too: poll, plain datagram sockets, ioctl; no threads, netlink, epoll or signalfd.
+/// (Packet sockets, which no such simulator knows, are datagram sockets here too.)
 class Kernel {
  public:
   virtual ~Kernel() = default;
@@ -24,12 +26,12 @@ class Kernel {
   /// reads 0.
   [[nodiscard]] virtual std::int64_t clock_ns(clockid_t clock) noexcept = 0;
   [[nodiscard]] virtual int socket(int domain, int type) noexcept = 0;
-  [[nodiscard]] virtual int bind(int fd, const sockaddr_in& address) noexcept = 0;
+  [[nodiscard]] virtual int bind(int fd, const SocketAddress& address) noexcept = 0;
   [[nodiscard]] virtual int set_option(int fd, int level, int name, const void* value,
                                        socklen_t size) noexcept = 0;
   [[nodiscard]] virtual int set_nonblocking(int fd) noexcept = 0;
   [[nodiscard]] virtual ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
-                                        const sockaddr_in& to) noexcept = 0;
+                                        const SocketAddress& to) noexcept = 0;
   [[nodiscard]] virtual ssize_t receive(int fd, msghdr& message, int flags) noexcept = 0;
   [[nodiscard]] virtual int control(int fd, unsigned long request, void* argument) noexcept = 0;
   [[nodiscard]] virtual int open(const char* path, int flags) noexcept = 0;
@@ -57,12 +59,12 @@ class LinuxKernel final : public Kernel {
  public:
   [[nodiscard]] std::int64_t clock_ns(clockid_t clock) noexcept override;
   [[nodiscard]] int socket(int domain, int type) noexcept override;
-  [[nodiscard]] int bind(int fd, const sockaddr_in& address) noexcept override;
+  [[nodiscard]] int bind(int fd, const SocketAddress& address) noexcept override;
   [[nodiscard]] int set_option(int fd, int level, int name, const void* value,
                                socklen_t size) noexcept override;
   [[nodiscard]] int set_nonblocking(int fd) noexcept override;
   [[nodiscard]] ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
-                                const sockaddr_in& to) noexcept override;
+                                const SocketAddress& to) noexcept override;
   [[nodiscard]] ssize_t receive(int fd, msghdr& message, int flags) noexcept override;
   [[nodiscard]] int control(int fd, unsigned long request, void* argument) noexcept override;
   [[nodiscard]] int open(const char* path, int flags) noexcept override;

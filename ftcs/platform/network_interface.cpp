@@ -92,12 +92,14 @@ std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd, const std::s
 }
 
 std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const std::string& name,
-                                                  const InterfaceCapabilities& capabilities) {
-  // The narrowest filter that passes PTP event messages over UDP; drivers widen it as they need.
-  constexpr std::array kFilters{HWTSTAMP_FILTER_PTP_V2_L4_EVENT, HWTSTAMP_FILTER_PTP_V2_EVENT,
-                                HWTSTAMP_FILTER_ALL};
+                                                  const InterfaceCapabilities& capabilities,
+                                                  bool ethernet) {
+  // The narrowest filter that passes PTP event messages; drivers widen it as they need.
+  const std::array filters{
+      ethernet ? HWTSTAMP_FILTER_PTP_V2_L2_EVENT : HWTSTAMP_FILTER_PTP_V2_L4_EVENT,
+      HWTSTAMP_FILTER_PTP_V2_EVENT, HWTSTAMP_FILTER_ALL};
   int result = -ERANGE;
-  for (const auto filter : kFilters) {
+  for (const auto filter : filters) {
     if ((capabilities.receive_filters & (1U << filter)) == 0) continue;
     hwtstamp_config config{};
     config.tx_type = HWTSTAMP_TX_ON;

@@ -39,9 +39,11 @@ struct InterfaceCapabilities {
 [[nodiscard]] std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd,
                                                           const std::string& name);
 
-/// Asks the driver to stamp PTP messages in both directions. Needs CAP_NET_ADMIN.
+/// Asks the driver to stamp PTP messages in both directions: over UDP, or over IEEE 802.3 itself.
+/// Needs CAP_NET_ADMIN.
 [[nodiscard]] std::optional<OsError> enable_hardware_timestamps(
-    Kernel& kernel, int fd, const std::string& name, const InterfaceCapabilities& capabilities);
+    Kernel& kernel, int fd, const std::string& name, const InterfaceCapabilities& capabilities,
+    bool ethernet);
 
 /// A 48-bit address to make a clock identity of: the interface's own or, where it has none
 /// (loopback), a locally administered one of this process, so that two processes on loopback are

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/ptp_socket.h"
 
-#include <arpa/inet.h>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <linux/errqueue.h>
@@ -11,15 +11,14 @@
 namespace ftcs::platform {
 namespace {
 
-constexpr std::uint32_t kPtpPrimaryMulticast =
-    0xE0000181;  // 224.0.1.129, IEEE 1588-2019, Annex C.3
 // A driver that has never delivered a stamp after so many messages does not stamp at all.
 constexpr std::uint64_t kMissesBeforeUserSpace = 8;
+constexpr std::size_t kLongestEventMessage = 128;
 
 struct Datagram {
   ssize_t size = 0;  // negative: -errno
   bool truncated = false;
-  in_addr sender{};
+  SocketAddress sender{};
   KernelStamps stamps{};
 };
 
@@ -27,7 +26,7 @@ Datagram receive_datagram(Kernel& kernel, int fd, std::span<std::uint8_t> buffer
   // Room for the stamps, the extended error of the error queue and its address.
   alignas(cmsghdr) std::array<char, 512> control{};
   iovec vector{buffer.data(), buffer.size()};
-  sockaddr_in sender{};
+  sockaddr_storage sender{};
   msghdr message{};
   message.msg_name = &sender;
   message.msg_namelen = sizeof sender;
@@ -39,7 +38,7 @@ Datagram receive_datagram(Kernel& kernel, int fd, std::span<std::uint8_t> buffer
   Datagram datagram;
   datagram.size = kernel.receive(fd, message, flags);
   if (datagram.size < 0) return datagram;
-  datagram.sender = sender.sin_addr;
+  datagram.sender = SocketAddress::from(sender);
   datagram.truncated = (message.msg_flags & MSG_TRUNC) != 0;
   for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr;
        header = CMSG_NXTHDR(&message, header)) {
@@ -50,10 +49,6 @@ Datagram receive_datagram(Kernel& kernel, int fd, std::span<std::uint8_t> buffer
     datagram.stamps = {nanoseconds(stamps.ts[0]), nanoseconds(stamps.ts[2])};
   }
   return datagram;
-}
-
-OsError socket_error(int result, const char* what, std::uint16_t port) {
-  return os_error(-result, std::string(what) + " port " + std::to_string(port));
 }
 
 }  // namespace
@@ -68,64 +63,17 @@ Result<PtpSocket, OsError> PtpSocket::open(Kernel& kernel, const PtpSocketConfig
 }
 
 std::optional<OsError> PtpSocket::open_channel(Channel channel) {
-  const int fd = kernel_->socket(AF_INET, SOCK_DGRAM);
-  if (fd < 0) return os_error(-fd, "socket");
-  Descriptor& owner = sockets_[static_cast<std::size_t>(channel)];
-  owner = Descriptor(*kernel_, fd);
-  if (const int result = kernel_->set_nonblocking(fd); result < 0) {
-    return os_error(-result, "socket");
-  }
-
-  const std::string& interface = config_.interface;
-  const auto state = interface_state(*kernel_, fd, interface);
+  const int asking = kernel_->socket(AF_INET, SOCK_DGRAM);
+  if (asking < 0) return os_error(-asking, "socket");
+  const Descriptor closes(*kernel_, asking);
+  const auto state = interface_state(*kernel_, asking, config_.interface);
   if (!state) return state.error();
   interface_ = *state;
-  if (!state->up) return os_error(ENETDOWN, "interface " + interface);
-  if (auto error = missing_ipv4_address(*kernel_, fd, interface)) return error;
-
-  // The name with its terminating zero. Without the right (kernels before 5.7) the multicast
-  // membership alone keeps other interfaces' messages out.
-  const int bound = kernel_->set_option(fd, SOL_SOCKET, SO_BINDTODEVICE, interface.c_str(),
-                                        static_cast<socklen_t>(interface.size() + 1));
-  if (bound < 0 && bound != -EPERM) return os_error(-bound, "interface " + interface);
-
-  // Multicast: several programs of one host may listen. Unicast: a port belongs to one.
-  const int share = config_.unicast ? 0 : 1;
-  int result = kernel_->set_option(fd, SOL_SOCKET, SO_REUSEADDR, &share, sizeof share);
-  if (result < 0) return os_error(-result, "socket");
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port(channel));
-  result = kernel_->bind(fd, address);
-  if (result < 0) return socket_error(result, "UDP", port(channel));
-  if (!config_.unicast) {
-    if (auto error = join_multicast(fd)) return error;
-  }
-  return channel == Channel::kEvent ? enable_timestamps(fd) : std::nullopt;
-}
-
-std::optional<OsError> PtpSocket::join_multicast(int fd) const {
-  ip_mreqn group{};
-  group.imr_multiaddr.s_addr = htonl(kPtpPrimaryMulticast);
-  group.imr_ifindex = interface_.index;
-  // On loopback the copy for ourselves is the only way to the neighbour process.
-  const int loop = interface_.loopback ? 1 : 0;
-  const int only_joined = 0;
-  struct Option {
-    int name;
-    const void* value;
-    socklen_t size;
-  };
-  const std::array options{Option{IP_ADD_MEMBERSHIP, &group, sizeof group},
-                           Option{IP_MULTICAST_IF, &group, sizeof group},
-                           Option{IP_MULTICAST_LOOP, &loop, sizeof loop},
-                           Option{IP_MULTICAST_ALL, &only_joined, sizeof only_joined},
-                           Option{IP_MULTICAST_TTL, &config_.ttl, sizeof config_.ttl}};
-  for (const Option& option : options) {
-    const int result = kernel_->set_option(fd, IPPROTO_IP, option.name, option.value, option.size);
-    if (result < 0) return os_error(-result, "multicast on " + config_.interface);
-  }
-  return std::nullopt;
+  if (!state->up) return os_error(ENETDOWN, "interface " + config_.interface);
+  auto opened = open_endpoint(*kernel_, config_, interface_, channel);
+  if (!opened) return opened.error();
+  sockets_[static_cast<std::size_t>(channel)] = std::move(*opened);
+  return channel == Channel::kEvent ? enable_timestamps(descriptor(channel)) : std::nullopt;
 }
 
 std::optional<OsError> PtpSocket::enable_timestamps(int fd) {
@@ -136,7 +84,8 @@ std::optional<OsError> PtpSocket::enable_timestamps(int fd) {
   if (clock_->is_hardware()) {
     const auto capabilities = interface_capabilities(*kernel_, fd, config_.interface);
     if (!capabilities) return capabilities.error();
-    if (auto error = enable_hardware_timestamps(*kernel_, fd, config_.interface, *capabilities)) {
+    if (auto error = enable_hardware_timestamps(*kernel_, fd, config_.interface, *capabilities,
+                                                config_.transport == NetworkTransport::kEthernet)) {
       return error;
     }
   }
@@ -157,13 +106,24 @@ std::optional<OsError> PtpSocket::enable_timestamps(int fd) {
 }
 
 std::optional<OsError> PtpSocket::send(Channel channel, std::span<const std::uint8_t> bytes,
-                                       std::optional<in_addr> to) {
-  if (!to) to = config_.unicast;
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port(channel));
-  address.sin_addr.s_addr = to ? to->s_addr : htonl(kPtpPrimaryMulticast);
-  const ssize_t result = kernel_->send_to(descriptor(channel), bytes, address);
+                                       Group group) {
+  return transmit(channel, bytes, destination_of(config_, interface_.index, channel, group));
+}
+
+std::optional<OsError> PtpSocket::send_to(Channel channel, std::span<const std::uint8_t> bytes,
+                                          const SocketAddress& to) {
+  return transmit(channel, bytes, to.with_port(port(channel)).on_interface(interface_.index));
+}
+
+std::optional<OsError> PtpSocket::transmit(Channel channel, std::span<const std::uint8_t> bytes,
+                                           const SocketAddress& to) {
+  std::array<std::uint8_t, kLongestEventMessage> padded{};
+  const std::size_t padding = padding_of(config_.transport);
+  if (channel == Channel::kEvent && padding > 0 && bytes.size() + padding <= padded.size()) {
+    std::copy(bytes.begin(), bytes.end(), padded.begin());
+    bytes = {padded.data(), bytes.size() + padding};
+  }
+  const ssize_t result = kernel_->send_to(descriptor(channel), bytes, to);
   if (result < 0) return os_error(static_cast<int>(-result), "sending on " + config_.interface);
   ++counters_.sent;
   if (channel != Channel::kEvent) return std::nullopt;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "ftcs/platform/kernel.h"
 #include "ftcs/platform/network_interface.h"
 #include "ftcs/platform/os_error.h"
+#include "ftcs/platform/ptp_endpoint.h"
 #include "ftcs/platform/timestamp_clock.h"
 #include "ftcs/platform/transmission_log.h"
 #include "ftcs/ptp/actions.h"
@@ -19,14 +21,7 @@
 
 namespace ftcs::platform {
 
-using ptp::Channel;
-
-struct PtpSocketConfig {
-  std::string interface;
-  std::uint16_t event_port = 319;
-  std::uint16_t general_port = 320;
-  std::optional<in_addr> unicast{};  ///< send here instead of to 224.0.1.129
-  int ttl = 1;                       ///< of multicast messages
+struct PtpSocketConfig : PtpEndpointConfig {
   /// How long the kernel may take to deliver a transmit timestamp (ptp4l: tx_timestamp_timeout).
   Nanoseconds tx_timestamp_timeout = std::chrono::milliseconds{10};
 };
@@ -35,7 +30,7 @@ struct PtpSocketConfig {
 struct ReceivedMessage {
   Channel channel = Channel::kEvent;
   std::span<const std::uint8_t> bytes;
-  in_addr sender{};
+  SocketAddress sender{};
   std::optional<Stamp> stamp{};  ///< of event messages; none: the kernel's stamp could not be used
 };
 
@@ -56,23 +51,26 @@ struct SocketCounters {
   std::uint64_t transmit_stamp_unknown = 0;  ///< matches no message that we remember
 };
 
-/// The two UDP/IPv4 sockets of one PTP port, with timestamps of the free-running clock. Nothing
+/// The two sockets of one PTP port, with timestamps of the free-running clock. Nothing
 /// blocks.
 ///
 /// One receive call for each readiness that poll(2) reports on a descriptor: POLLIN means
 /// receive(), POLLPRI or POLLERR means receive_transmitted().
 class PtpSocket {
  public:
-  /// Opens, binds, joins 224.0.1.129 and asks for timestamps. The error says what could not be had.
+  /// Opens, binds, joins the groups and asks for timestamps. The error says what could not be had.
   /// `clock` must outlive the socket.
   [[nodiscard]] static Result<PtpSocket, OsError> open(Kernel& kernel,
                                                        const PtpSocketConfig& config,
                                                        TimestampClock& clock);
 
-  /// Sends to `to`, or else to the configured peer, or else to the multicast group. The stamp of an
+  /// Sends to the group or, where one is configured, to the only peer instead. The stamp of an
   /// event message comes later, from receive_transmitted().
   [[nodiscard]] std::optional<OsError> send(Channel channel, std::span<const std::uint8_t> bytes,
-                                            std::optional<in_addr> to = {});
+                                            Group group = Group::kPrimary);
+  /// Sends to this host, at the channel's port.
+  [[nodiscard]] std::optional<OsError> send_to(Channel channel, std::span<const std::uint8_t> bytes,
+                                               const SocketAddress& to);
   /// No value: nothing there, or dropped and counted.
   [[nodiscard]] Result<std::optional<ReceivedMessage>, OsError> receive(Channel channel);
   /// A stamp from the error queue, matched to its message by content.
@@ -97,7 +95,9 @@ class PtpSocket {
       : kernel_(&kernel), config_(std::move(config)), clock_(&clock) {}
 
   [[nodiscard]] std::optional<OsError> open_channel(Channel channel);
-  [[nodiscard]] std::optional<OsError> join_multicast(int fd) const;
+  [[nodiscard]] std::optional<OsError> transmit(Channel channel,
+                                                std::span<const std::uint8_t> bytes,
+                                                const SocketAddress& to);
   [[nodiscard]] std::optional<OsError> enable_timestamps(int fd);
   [[nodiscard]] std::uint16_t port(Channel channel) const noexcept {
     return channel == Channel::kEvent ? config_.event_port : config_.general_port;

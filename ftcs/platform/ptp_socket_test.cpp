@@ -128,19 +128,90 @@ TEST(PtpSocket, maps_software_stamps_of_both_directions_to_the_raw_clock) {
   EXPECT_NEAR(((*received)->stamp->time - FreeRunningTime::from_ns(raw)).ns(), 0.0, 100.0);
 }
 
-TEST(PtpSocket, sends_to_the_multicast_group_or_to_the_unicast_peer_of_the_channel) {
+TEST(PtpSocket, sends_to_the_groups_of_its_transport_or_to_the_unicast_peer) {
+  struct Case {
+    NetworkTransport transport;
+    const char* primary;
+    const char* peer_delay;
+    const char* peer;
+  };
+  for (const Case& one :
+       {Case{NetworkTransport::kUdpIpv4, "224.0.1.129", "224.0.0.107", "10.0.0.2"},
+        Case{NetworkTransport::kUdpIpv6, "ff0e::181", "ff02::6b", "fe80::1"},
+        Case{NetworkTransport::kEthernet, "01-1b-19-00-00-00", "01-80-c2-00-00-0e",
+             "02-00-00-00-00-05"}}) {
+    SCOPED_TRACE(name(one.transport));
+    Bench bench;
+    bench.config.transport = one.transport;
+    auto multicast = bench.open();
+    ASSERT_TRUE(multicast.ok());
+    const bool udp = one.transport != NetworkTransport::kEthernet;
+    EXPECT_FALSE(multicast->send(Channel::kGeneral, message(1)));
+    EXPECT_EQ(bench.kernel.last_destination.host(), one.primary);
+    EXPECT_EQ(bench.kernel.last_destination.port(), udp ? 320 : 0);
+    EXPECT_FALSE(multicast->send(Channel::kEvent, message(1), Group::kPeerDelay));
+    EXPECT_EQ(bench.kernel.last_destination.host(), one.peer_delay);
+    EXPECT_EQ(bench.kernel.last_destination.port(), udp ? 319 : 0);
+    bench.config.unicast = parse_peer(one.transport, one.peer);
+    ASSERT_TRUE(bench.config.unicast.has_value());
+    auto unicast = bench.open();
+    EXPECT_FALSE(unicast->send(Channel::kEvent, message(1), Group::kPeerDelay));
+    EXPECT_EQ(bench.kernel.last_destination.host(), one.peer);
+    EXPECT_EQ(bench.kernel.last_destination.port(), udp ? 319 : 0);
+  }
+}
+
+TEST(PtpSocket, an_answer_goes_back_to_where_the_question_came_from) {
   Bench bench;
-  auto multicast = bench.open();
-  (void)multicast->send(Channel::kGeneral, message(1));
-  EXPECT_EQ(ntohl(bench.kernel.last_destination.sin_addr.s_addr), 0xE0000181U);
-  EXPECT_EQ(ntohs(bench.kernel.last_destination.sin_port), 320);
-  in_addr peer{};
-  peer.s_addr = htonl(0x0A000002);
-  bench.config.unicast = peer;
-  auto unicast = bench.open();
-  (void)unicast->send(Channel::kEvent, message(1));
-  EXPECT_EQ(bench.kernel.last_destination.sin_addr.s_addr, peer.s_addr);
-  EXPECT_EQ(ntohs(bench.kernel.last_destination.sin_port), 319);
+  auto socket = bench.open();
+  const auto peer = parse_peer(NetworkTransport::kUdpIpv4, "10.0.0.9")->with_port(40'000);
+  EXPECT_FALSE(socket->send_to(Channel::kGeneral, message(1), peer));
+  EXPECT_EQ(bench.kernel.last_destination.host(), "10.0.0.9");
+  EXPECT_EQ(bench.kernel.last_destination.port(), 320);
+}
+
+TEST(PtpSocket, event_messages_over_ipv6_end_with_two_octets_more_and_are_stamped_all_the_same) {
+  Bench bench;
+  bench.config.transport = NetworkTransport::kUdpIpv6;
+  auto socket = bench.open();
+  EXPECT_FALSE(socket->send(Channel::kGeneral, message(1)));
+  EXPECT_EQ(bench.kernel.sent.back().bytes.size(), message(1).size());
+  EXPECT_FALSE(socket->send(Channel::kEvent, message(7)));
+  EXPECT_EQ(bench.kernel.sent.back().bytes.size(), message(7).size() + 2);
+  const auto stamped = socket->receive_transmitted();
+  ASSERT_TRUE(stamped && stamped->stamp);
+  EXPECT_EQ(stamped->bytes[31], 7);
+}
+
+TEST(PtpSocket, over_ethernet_it_needs_no_address_and_says_that_it_needs_a_right) {
+  Bench bench;
+  bench.config.transport = NetworkTransport::kEthernet;
+  bench.kernel.interface_has_address = false;
+  auto socket = bench.open();
+  ASSERT_TRUE(socket.ok());
+  for (const Channel channel : {Channel::kEvent, Channel::kGeneral}) {
+    const auto& opened = bench.kernel.sockets[socket->descriptor(channel)];
+    EXPECT_EQ(opened.family, AF_PACKET);
+    // Before it is bound, so that nothing slips by.
+    EXPECT_EQ(opened.options.front(), (std::pair{SOL_SOCKET, SO_ATTACH_FILTER}));
+  }
+  bench.kernel.packet_socket_errno = EPERM;
+  const auto refused = bench.open();
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().kind, OsErrorKind::kNotPermitted);
+}
+
+TEST(PtpSocket, an_interrupted_call_is_no_error) {
+  Bench bench;
+  auto socket = bench.open();
+  bench.kernel.receive_errno = EINTR;
+  const auto received = socket->receive(Channel::kEvent);
+  ASSERT_TRUE(received.ok());
+  EXPECT_FALSE(received->has_value());
+  bench.kernel.receive_errno = EINTR;
+  EXPECT_FALSE(socket->receive_transmitted().has_value());
+  bench.kernel.send_errno = EINTR;
+  EXPECT_TRUE(socket->send(Channel::kGeneral, message(1)).has_value());
 }
 
 TEST(PtpSocket, reports_a_missing_transmit_stamp_once_and_still_matches_it_when_it_comes_late) {

@@ -42,9 +42,18 @@ std::optional<OsError> PtpTransport::open() {
 }
 
 std::optional<OsError> PtpTransport::send(Channel channel, std::span<const std::uint8_t> bytes,
-                                          std::optional<in_addr> to) {
+                                          Group group) {
   if (!socket_) return os_error(ENETDOWN, "interface " + config_.interface);
-  auto error = socket_->send(channel, bytes, to);
+  return note(socket_->send(channel, bytes, group));
+}
+
+std::optional<OsError> PtpTransport::send_to(Channel channel, std::span<const std::uint8_t> bytes,
+                                             const SocketAddress& to) {
+  if (!socket_) return os_error(ENETDOWN, "interface " + config_.interface);
+  return note(socket_->send_to(channel, bytes, to));
+}
+
+std::optional<OsError> PtpTransport::note(std::optional<OsError> error) {
   if (error) suspect_ = true;
   return error;
 }

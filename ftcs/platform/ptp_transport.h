@@ -46,7 +46,10 @@ class PtpTransport {
   [[nodiscard]] std::optional<OsError> open();
   /// An error is also noted for the link's sake: the caller need not act on it.
   std::optional<OsError> send(Channel channel, std::span<const std::uint8_t> bytes,
-                              std::optional<in_addr> to = {});
+                              Group group = Group::kPrimary);
+  /// To one host instead.
+  std::optional<OsError> send_to(Channel channel, std::span<const std::uint8_t> bytes,
+                                 const SocketAddress& to);
   /// Handles what arrives until `deadline` (on the free-running clock), or returns early after an
   /// event or a signal, and at the latest after a quarter of a second.
   void wait_until(FreeRunningTime deadline);
@@ -63,6 +66,7 @@ class PtpTransport {
   [[nodiscard]] const PtpSocket* socket() const noexcept { return socket_ ? &*socket_ : nullptr; }
 
  private:
+  std::optional<OsError> note(std::optional<OsError> error);
   void poll_sockets(FreeRunningTime deadline);
   void receive(Channel channel);
   void report_overdue();

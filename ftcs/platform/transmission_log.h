@@ -27,7 +27,7 @@ class TransmissionLog {
   };
 
   void remember(std::span<const std::uint8_t> message, FreeRunningTime now) noexcept;
-  /// The message at the end of `packet` (headers of lower layers precede it); it is forgotten.
+  /// The message that `packet` holds behind the headers of lower layers; it is forgotten.
   [[nodiscard]] std::optional<Entry> match(std::span<const std::uint8_t> packet) noexcept;
   /// The next message that was sent `timeout` or longer before `now`; each is reported once.
   [[nodiscard]] std::optional<std::span<const std::uint8_t>> expire(FreeRunningTime now,

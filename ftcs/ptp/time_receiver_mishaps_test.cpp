@@ -328,5 +328,14 @@ TEST_F(Receiver, a_jump_of_the_reference_is_reported_and_open_requests_are_forgo
   EXPECT_EQ(back[0].jump, Duration{-1s});
 }
 
+TEST_F(Receiver, a_transmitter_started_again_with_the_same_ids_makes_no_wrong_pair) {
+  select_a();
+  static_cast<void>(event(sync_from(kA, 0), 1s));          // then it died, before the Follow_Up
+  static_cast<void>(event(sync_from(kA, 0), 1s + 400ms));  // and began again with the same id
+  EXPECT_TRUE(of<EmitPair>(general(follow_up(0, 1s + 400ms), 1s + 401ms)).empty());
+  EXPECT_EQ(count(Counter::kDuplicateSync), 1U);
+  EXPECT_EQ(of<EmitPair>(exchange(1, 1s + 525ms)).size(), 1U);
+}
+
 }  // namespace
 }  // namespace ftcs::ptp::receiver_test

@@ -67,6 +67,8 @@ class TimeTransmitter {
   /// When on_timer() must be called; none while nothing is to be sent.
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
   [[nodiscard]] PortState state() const noexcept { return port_.state(); }
+  /// What the neighbour at the other end of the link measured as; peer to peer only.
+  [[nodiscard]] const PeerDelay& peer_delay() const noexcept { return peer_delay_; }
   [[nodiscard]] const Counters& counters() const noexcept { return port_.counters(); }
 
  private:

@@ -4,6 +4,7 @@
 // clock that began at zero.
 #include "ftcs/ptp/time_transmitter.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -268,6 +269,89 @@ TEST_F(Transmitter, allocates_nothing) {
     actions += transmitter_.on_event_message(request.view(), reference(0s), raw(0s)).size();
   }
   EXPECT_EQ(actions, 4U);
+}
+
+/// IEEE 802.1AS: peer to peer, information in Follow_Up, path trace in Announce.
+class GptpTransmitter : public Transmitter {
+ protected:
+  GptpTransmitter() : Transmitter(gptp_config()) {}
+  static TimeTransmitterConfig gptp_config() {
+    TimeTransmitterConfig config = default_config();
+    config.domain = 0;
+    config.major_sdo_id = 1;
+    config.delay_mechanism = DelayMechanism::kPeerToPeer;
+    config.peer_delay.capability_needed = true;
+    config.follow_up_info = true;
+    config.path_trace = true;
+    return config;
+  }
+  ActionList hand_over(Message message, Nanoseconds at) {
+    message.header.major_sdo_id = 1;
+    message.header.source = kReceiver;
+    const auto bytes = encode(message);
+    return transmitter_.on_event_message(bytes->view(), reference(at), raw(at));
+  }
+  /// The neighbour answers the request of this second.
+  std::vector<Sent> second(Nanoseconds at) {
+    const auto messages = sent(transmitter_.on_timer(raw(at)));
+    for (const auto& one : messages) {
+      if (one.how.type != MessageType::kPdelayReq) continue;
+      static_cast<void>(transmitter_.on_transmit_timestamp(one.how.id(), reference(at), raw(at)));
+      Message answer;
+      answer.header.flags = flag::kTwoStep;
+      answer.header.sequence_id = one.how.sequence_id;
+      answer.body = PdelayResp{reference(at + 500ns), kUs};
+      static_cast<void>(hand_over(answer, at + 1us));
+      answer.body = PdelayRespFollowUp{reference(at + 500ns), kUs};
+      static_cast<void>(hand_over(answer, at + 2us));
+    }
+    return messages;
+  }
+};
+
+TEST_F(GptpTransmitter, transmits_nothing_but_questions_until_the_neighbour_is_capable) {
+  for (const Nanoseconds at : {0s, 1s}) {
+    const auto messages = second(at);
+    ASSERT_EQ(messages.size(), 1U);
+    EXPECT_EQ(messages[0].how.type, MessageType::kPdelayReq);
+  }
+  EXPECT_EQ(transmitter_.peer_delay().mean_link_delay(), Duration{500ns});
+  const auto messages = sent(transmitter_.on_timer(raw(2s)));
+  ASSERT_EQ(messages.size(), 3U);
+  EXPECT_EQ(messages[1].how.type, MessageType::kAnnounce);
+  EXPECT_EQ(messages[2].how.type, MessageType::kSync);
+}
+
+TEST_F(GptpTransmitter, says_in_announce_and_follow_up_what_802_1as_wants_to_be_told) {
+  for (const Nanoseconds at : {0s, 1s}) static_cast<void>(second(at));
+  const auto actions = transmitter_.on_timer(raw(2s));
+  const auto messages = sent(actions);
+  const auto announce = messages.at(1).how.bytes.view();
+  ASSERT_EQ(announce.size(), 76U);
+  EXPECT_EQ(announce[65], 0x08);  // PATH_TRACE
+  EXPECT_EQ(announce[67], 8);
+  EXPECT_TRUE(std::equal(kUs.clock.octets.begin(), kUs.clock.octets.end(), announce.begin() + 68));
+  const auto follow_ups =
+      sent(transmitter_.on_transmit_timestamp(messages.at(2).how.id(), reference(2s), raw(2s)));
+  ASSERT_EQ(follow_ups.size(), 1U);
+  const auto octets = follow_ups[0].how.bytes.view();
+  ASSERT_EQ(octets.size(), 76U);
+  EXPECT_EQ((std::vector<std::uint8_t>(octets.begin() + 44, octets.begin() + 54)),
+            (std::vector<std::uint8_t>{0, 3, 0, 28, 0, 0x80, 0xC2, 0, 0, 1}));
+  EXPECT_TRUE(std::get<FollowUp>(follow_ups[0].message.body).has_information);
+}
+
+TEST_F(GptpTransmitter, ignores_end_to_end_requests_and_answers_its_neighbour) {
+  Message message;
+  message.body = DelayReq{};
+  EXPECT_TRUE(hand_over(message, 1s).empty());
+  EXPECT_EQ(count(Counter::kDelayIgnored), 1U);
+  message.body = PdelayReq{};
+  const auto answer = sent(hand_over(message, 1s));
+  ASSERT_EQ(answer.size(), 1U);
+  EXPECT_EQ(answer[0].how.destination, Destination::kNeighbour);
+  static_cast<void>(transmitter_.on_link_down(raw(2s)));
+  EXPECT_FALSE(transmitter_.deadline().has_value());
 }
 
 }  // namespace

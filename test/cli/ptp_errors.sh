@@ -33,12 +33,16 @@ expect 2 "subcommand is required"
 expect 2 "--bogus" ptp --bogus
 expect 2 "no interface" ptp
 expect 2 "only one port" ptp -i lo -i eth0
-expect 2 "peer delay mechanism is not supported" ptp -i lo -P
-expect 2 "IEEE 802.3 is not supported" ptp -i lo -2
-expect 2 "UDP/IPv6 is not supported" ptp -i lo -6
 expect 2 "expected virtual, system, phc, /dev/ptpN or auto" ptp -i lo --clock realtime
 expect 2 "only of the virtual clock" ptp -i lo --clock auto --skew 1ppm
 expect 2 "a time transmitter steers no clock" ptp -i lo --clock auto --role time-transmitter
+expect 2 "--preset: unknown preset 'telecom' (known: default-e2e, default-p2p, gptp)" ptp -i lo --preset telecom
+expect 2 "--acceptable-transmitter: 'me': expected 001122.fffe.334455" ptp -i lo --acceptable-transmitter me
+expect 2 "'fe80::1' is not an IPv4 address" ptp -i lo --unicast fe80::1
+expect 2 "'10.0.0.1' is not an IPv6 address" ptp -i lo -6 --unicast 10.0.0.1
+expect 2 "'10.0.0.1' is not an Ethernet address" ptp -i lo -2 --unicast 10.0.0.1
+expect 2 "exclude each other" ptp -i lo --hybrid_e2e 1 --unicast 10.0.0.1
+expect 2 "ptp_dst_mac: '01:02': expected 01:1B:19:00:00:00" ptp -i lo --ptp_dst_mac 01:02
 expect 2 "unknown servo 'magic'" ptp -i lo --servo magic
 expect 2 "offset gain must lie between 0 and 1" ptp -i lo --servo ftcs --offset-gain 2
 expect 2 "is no band" ptp -i lo --servo ftcs --converged-band 5us:1us
@@ -51,7 +55,7 @@ expect 2 "must differ" ptp -i lo --event-port 4000 --general-port 4000
 expect 2 "--role" ptp -i lo --role grandmaster
 expect 2 "-s asks for a time receiver" ptp -i lo -s --role time-transmitter
 expect 2 "domainNumber: '256': expected an integer from 0 to 255" ptp -i lo --domainNumber 256
-expect 2 "'L2' is not supported, only UDPv4" ptp -i lo --network_transport L2
+expect 2 "'DeviceNet' is not supported, only UDPv4, UDPv6 and L2" ptp -i lo --network_transport DeviceNet
 expect 2 "excludes" ptp -i lo -H -S
 expect 2 "$folder/none.conf: No such file" ptp -f "$folder/none.conf"
 
@@ -64,8 +68,8 @@ expect 2 "--logSyncInterval: '1': expected an integer from -7 to 0" demo --logSy
 
 config "[global]" "domainNumber 0" "colour blue"
 expect 2 "ptp.conf:3: unknown setting 'colour'" ptp -i lo -f "$folder/ptp.conf"
-config "[global]" "" "# a comment" "delay_mechanism P2P"
-expect 2 "ptp.conf:4: delay_mechanism: 'P2P' is not supported, only E2E" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "" "# a comment" "delay_mechanism Auto"
+expect 2 "ptp.conf:4: delay_mechanism: 'Auto' is not supported, only E2E and P2P" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "logSyncInterval zero"
 expect 2 "ptp.conf:2: logSyncInterval" ptp -i lo -f "$folder/ptp.conf"
 config "domainNumber 0"

@@ -252,5 +252,46 @@ TEST(Identity, is_printed_as_ptp4l_prints_it) {
   EXPECT_EQ(to_text(port).view(), "001b21.fffe.a1b2c3-65535");
 }
 
+/// As a bridge sends it: 802.1AS-2020, 11.4.4.3. 2^41 times 1e-6 is 2'199'023.
+TEST(FollowUpInformationTlv, is_read_and_written_octet_by_octet) {
+  FollowUp body;
+  body.has_information = true;
+  body.information.cumulative_scaled_rate_offset = 2'199'023;
+  body.information.gm_time_base_indicator = 0x0102;
+  body.information.last_gm_phase_change = Duration::from_ns(-1.5);
+  body.information.scaled_last_gm_freq_change = -1;
+  Message message;
+  message.body = body;
+  const auto bytes = encode(message);
+  ASSERT_TRUE(bytes.ok());
+  const std::vector<std::uint8_t> tlv(bytes->view().begin() + 44, bytes->view().end());
+  EXPECT_EQ(tlv, (std::vector<std::uint8_t>{0x00, 0x03, 0x00, 0x1C, 0x00, 0x80, 0xC2, 0x00,
+                                            0x00, 0x01,              // id
+                                            0x00, 0x21, 0x8D, 0xEF,  // rate
+                                            0x01, 0x02,              // time base
+                                            0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,
+                                            0xFF, 0xFE, 0x80, 0x00, 0xFF, 0xFF, 0xFF, 0xFF}));
+  EXPECT_NEAR(body.information.cumulative_rate_offset(), 1e-6, 1e-12);
+  const auto again = decode(bytes->view());
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(*again, message);
+}
+
+TEST(FollowUpInformationTlv, of_another_organization_or_length_is_skipped) {
+  Message message;
+  FollowUp body;
+  body.has_information = true;
+  message.body = body;
+  const auto bytes = encode(message);
+  std::vector<std::uint8_t> octets(bytes->view().begin(), bytes->view().end());
+  octets[49] = 0x81;  // not 00-80-C2
+  EXPECT_FALSE(std::get<FollowUp>(decode(octets)->body).has_information);
+  octets[49] = 0x80;
+  octets[47] = 26;  // two octets too short: no TLV of ours, and two octets of padding
+  EXPECT_FALSE(std::get<FollowUp>(decode(octets)->body).has_information);
+  octets[47] = 30;
+  EXPECT_EQ(decode(octets).error().reason, DecodeReason::kMalformedTlv);
+}
+
 }  // namespace
 }  // namespace ftcs::ptp

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: MIT
+//
+// The world: our port and its neighbour, 700 ns of cable apart. The neighbour's clock began at
+// another time and is 100 ppm fast; it answers 10 ms after it was asked, unless a test says
+// otherwise. All messages pass as octets.
+#include "ftcs/ptp/peer_delay.h"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs::ptp {
+namespace {
+using namespace std::chrono_literals;
+
+const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
+const PortIdentity kNeighbour{ClockIdentity::from_mac({2, 0, 0, 0, 0, 2}), 1};
+const PortIdentity kStranger{ClockIdentity::from_mac({2, 0, 0, 0, 0, 3}), 1};
+constexpr Nanoseconds kLink = 700ns;
+constexpr Nanoseconds kTurnAround = 10ms;
+
+FreeRunningTime ours(Nanoseconds time) { return FreeRunningTime{Duration{time + 77s}}; }
+ReferenceTime neighbours(Nanoseconds time) {
+  return ReferenceTime{scale(Duration{time}, Rate::from_ppm(100.0)) + Duration{1'800'000'000s}};
+}
+
+template <class T>
+std::vector<T> of(const ActionList& actions) {
+  std::vector<T> found;
+  for (const Action& action : actions) {
+    if (const T* one = std::get_if<T>(&action)) found.push_back(*one);
+  }
+  return found;
+}
+
+class PeerDelayTest : public testing::Test {
+ protected:
+  explicit PeerDelayTest(const PeerDelayConfig& config = {}) : peer_(config) {
+    ActionList ignored;
+    port_.change_state(PortState::kListening, PortEvent::kInitComplete, ignored);
+    peer_.start(ours(0s));
+  }
+
+  /// Sends the request that is due; its sequence id.
+  std::uint16_t ask(Nanoseconds at) {
+    ActionList actions;
+    peer_.on_timer(ours(at), port_, actions);
+    const auto sent = of<SendMessage>(actions);
+    EXPECT_EQ(sent.size(), 1U);
+    if (sent.empty()) return 0;
+    EXPECT_EQ(sent[0].destination, Destination::kNeighbour);
+    EXPECT_EQ(sent[0].type, MessageType::kPdelayReq);
+    return sent[0].sequence_id;
+  }
+  ActionList stamp(std::uint16_t sequence_id, Nanoseconds at) {
+    ActionList actions;
+    peer_.on_sent({MessageType::kPdelayReq, sequence_id, {}}, ours(at), port_, actions);
+    return actions;
+  }
+  ActionList hand_over(const Message& message, Nanoseconds at) {
+    ActionList actions;
+    const auto bytes = encode(message);
+    EXPECT_TRUE(bytes.ok());
+    if (const auto read = port_.read(bytes->view())) {
+      peer_.on_message(*read, ours(at), port_, actions);
+    }
+    return actions;
+  }
+  static Message message(std::uint16_t sequence_id, const Body& body,
+                         const PortIdentity& source = kNeighbour) {
+    Message message;
+    message.header.source = source;
+    message.header.sequence_id = sequence_id;
+    message.body = body;
+    return message;
+  }
+  static Message response(std::uint16_t sequence_id, Nanoseconds received,
+                          const PortIdentity& source = kNeighbour) {
+    Message answer = message(sequence_id, PdelayResp{neighbours(received), kUs}, source);
+    answer.header.flags = flag::kTwoStep;
+    return answer;
+  }
+  static Message follow_up(std::uint16_t sequence_id, Nanoseconds sent,
+                           const PortIdentity& source = kNeighbour) {
+    return message(sequence_id, PdelayRespFollowUp{neighbours(sent), kUs}, source);
+  }
+  /// A whole exchange that begins at `at`.
+  std::vector<EmitPeerDelay> exchange(Nanoseconds at, const PortIdentity& source = kNeighbour) {
+    const std::uint16_t id = ask(at);
+    static_cast<void>(stamp(id, at));
+    const Nanoseconds left = at + kLink + kTurnAround;
+    static_cast<void>(hand_over(response(id, at + kLink, source), left + kLink));
+    return of<EmitPeerDelay>(hand_over(follow_up(id, left, source), left + 2 * kLink));
+  }
+  [[nodiscard]] std::uint64_t count(Counter counter) const { return port_.counters()[counter]; }
+
+  Port port_{PortConfig{.identity = kUs}};
+  PeerDelay peer_;
+};
+
+TEST_F(PeerDelayTest, first_exchange_takes_the_turn_around_as_it_is_the_second_knows_the_rate) {
+  const auto first = exchange(0s);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_TRUE(first[0].first);
+  // 10 ms of the neighbour's clock, 100 ppm fast, are 1 us too long: half of it is missing.
+  EXPECT_NEAR(first[0].mean_link_delay.ns(), 700.0 - 500.0, 1.0);
+  const auto second = exchange(1s);
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_FALSE(second[0].first);
+  EXPECT_NEAR(second[0].neighbor_rate_ratio.ppm(), 100.0, 1e-3);
+  EXPECT_NEAR(second[0].mean_link_delay.ns(), 700.0, 0.5);
+  EXPECT_EQ(count(Counter::kPeerDelays), 2U);
+}
+
+TEST_F(PeerDelayTest, a_one_step_answer_has_its_turn_around_in_the_correction) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  Message answer = message(id, PdelayResp{ReferenceTime{}, kUs});
+  answer.header.correction = Duration{kTurnAround};
+  const auto delays = of<EmitPeerDelay>(hand_over(answer, kTurnAround + 2 * kLink));
+  ASSERT_EQ(delays.size(), 1U);
+  EXPECT_EQ(delays[0].mean_link_delay, Duration{kLink});
+  EXPECT_EQ(delays[0].neighbor_rate_ratio, Rate{});
+}
+
+TEST_F(PeerDelayTest, a_two_step_answer_may_tell_the_difference_alone) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  Message answer = message(id, PdelayResp{ReferenceTime{}, kUs});
+  answer.header.flags = flag::kTwoStep;
+  static_cast<void>(hand_over(answer, kTurnAround + 2 * kLink));
+  Message last = message(id, PdelayRespFollowUp{ReferenceTime{}, kUs});
+  last.header.correction = Duration{kTurnAround};
+  const auto delays = of<EmitPeerDelay>(hand_over(last, 20ms));
+  ASSERT_EQ(delays.size(), 1U);
+  EXPECT_EQ(delays[0].mean_link_delay, Duration{kLink});
+}
+
+TEST_F(PeerDelayTest, stamp_answer_and_follow_up_may_come_in_any_order) {
+  const auto complete = [this](int order, Nanoseconds at) {
+    const auto id = ask(at);
+    const Nanoseconds left = at + kLink + kTurnAround;
+    std::size_t emitted = 0;
+    for (const int part : {order / 100, order / 10 % 10, order % 10}) {
+      ActionList actions;
+      if (part == 1) actions = stamp(id, at);
+      if (part == 2) actions = hand_over(response(id, at + kLink), left + kLink);
+      if (part == 3) actions = hand_over(follow_up(id, left), left + kLink);
+      emitted += of<EmitPeerDelay>(actions).size();
+    }
+    return emitted;
+  };
+  Nanoseconds at = 0s;
+  for (const int order : {123, 132, 213, 231, 312, 321}) {
+    SCOPED_TRACE(order);
+    EXPECT_EQ(complete(order, at), 1U);
+    EXPECT_NEAR(peer_.mean_link_delay()->ns(), 700.0, 501.0);
+    at += 1s;
+  }
+}
+
+TEST_F(PeerDelayTest, keeps_its_interval_and_counts_what_was_lost) {
+  const auto first = ask(0s);
+  EXPECT_EQ(peer_.deadline(), ours(1s));
+  static_cast<void>(stamp(first, 0s));
+  const auto second = ask(1s);  // nobody answered the first
+  EXPECT_EQ(count(Counter::kLostPdelayResp), 1U);
+  static_cast<void>(stamp(second, 1s));
+  static_cast<void>(hand_over(response(second, 1s + kLink), 1s + kTurnAround));
+  const auto third = ask(2s);  // the answer to the second was never completed
+  EXPECT_EQ(count(Counter::kLostPdelayRespFollowUp), 1U);
+  EXPECT_TRUE(hand_over(follow_up(second, 1s + kTurnAround), 2s).empty());
+  EXPECT_EQ(count(Counter::kStalePdelayResp), 1U);
+  peer_.on_stamp_missing({MessageType::kPdelayReq, third, {}}, port_);
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+  EXPECT_TRUE(hand_over(response(third, 2s), 2s + kTurnAround).empty());
+  EXPECT_EQ(exchange(3s).size(), 1U) << "and none of it does harm to the next";
+}
+
+TEST_F(PeerDelayTest, answers_to_others_and_to_nothing_are_dropped) {
+  EXPECT_TRUE(hand_over(response(0, 0s), 1ms).empty()) << "nothing was asked";
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  Message foreign = response(id, kLink);
+  std::get<PdelayResp>(foreign.body).requesting_port = kStranger;
+  EXPECT_TRUE(hand_over(foreign, 1ms).empty());
+  EXPECT_EQ(count(Counter::kWrongRequestingPort), 1U);
+  EXPECT_TRUE(hand_over(response(static_cast<std::uint16_t>(id + 7), kLink), 1ms).empty());
+  EXPECT_EQ(count(Counter::kStalePdelayResp), 2U);
+  Message absurd = response(id, kLink);
+  absurd.header.correction = Duration{2s};
+  EXPECT_TRUE(hand_over(absurd, 1ms).empty());
+  EXPECT_EQ(count(Counter::kAbsurdCorrection), 1U);
+  EXPECT_EQ(count(Counter::kPdelayRespReceived), 0U);
+}
+
+TEST_F(PeerDelayTest, two_ports_that_answer_are_no_link_between_two_ports) {
+  EXPECT_EQ(exchange(0s).size(), 1U);
+  const auto id = ask(1s);
+  static_cast<void>(stamp(id, 1s));
+  const Nanoseconds left = 1s + kLink + kTurnAround;
+  static_cast<void>(hand_over(response(id, 1s + kLink), left + kLink));
+  static_cast<void>(hand_over(response(id, 1s + kLink, kStranger), left + 2 * kLink));
+  EXPECT_EQ(count(Counter::kSeveralResponders), 1U);
+  EXPECT_TRUE(hand_over(follow_up(id, left), left + 3 * kLink).empty());
+  EXPECT_TRUE(hand_over(follow_up(id, left, kStranger), left + 3 * kLink).empty());
+  EXPECT_EQ(count(Counter::kWrongPeer), 1U);
+  // Three requests with one answer each, then it is believed again.
+  EXPECT_TRUE(exchange(2s).empty());
+  EXPECT_TRUE(exchange(3s).empty());
+  EXPECT_TRUE(exchange(4s).empty());
+  EXPECT_EQ(exchange(5s).size(), 1U);
+}
+
+TEST_F(PeerDelayTest, a_second_answer_is_noticed_even_after_the_first_exchange_is_over) {
+  EXPECT_EQ(exchange(0s).size(), 1U);
+  static_cast<void>(hand_over(response(0, kLink, kStranger), 50ms));
+  EXPECT_EQ(count(Counter::kSeveralResponders), 1U);
+  EXPECT_TRUE(exchange(1s).empty());
+}
+
+TEST_F(PeerDelayTest, a_follow_up_of_another_port_completes_nothing) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  const Nanoseconds left = kLink + kTurnAround;
+  static_cast<void>(hand_over(follow_up(id, left, kStranger), left));  // before the answer
+  EXPECT_TRUE(of<EmitPeerDelay>(hand_over(response(id, kLink), left + kLink)).empty());
+  EXPECT_EQ(count(Counter::kWrongPeer), 1U);
+  EXPECT_EQ(of<EmitPeerDelay>(hand_over(follow_up(id, left), left + 2 * kLink)).size(), 1U);
+  EXPECT_TRUE(hand_over(follow_up(id, left), left + 3 * kLink).empty()) << "a duplicate";
+}
+
+TEST_F(PeerDelayTest, a_neighbour_whose_clock_is_stepped_is_measured_anew) {
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(exchange(1s * i).size(), 1U);
+  const auto id = ask(4s);
+  static_cast<void>(stamp(id, 4s));
+  const Nanoseconds left = 4s + kLink + kTurnAround;
+  static_cast<void>(hand_over(response(id, 4s + kLink + 37s), left + kLink));
+  const auto delays = of<EmitPeerDelay>(hand_over(follow_up(id, left + 37s), left + 2 * kLink));
+  ASSERT_EQ(delays.size(), 1U) << "the delay needs no rate";
+  EXPECT_EQ(delays[0].neighbor_rate_ratio, Rate{});
+  EXPECT_EQ(count(Counter::kPeerRateRestarts), 1U);
+}
+
+TEST_F(PeerDelayTest, another_neighbour_is_another_link) {
+  EXPECT_TRUE(exchange(0s)[0].first);
+  EXPECT_FALSE(exchange(1s)[0].first);
+  EXPECT_TRUE(exchange(2s, kStranger)[0].first);
+  peer_.stop();
+  EXPECT_FALSE(peer_.deadline().has_value());
+  EXPECT_FALSE(peer_.mean_link_delay().has_value());
+  peer_.start(ours(9s));
+  EXPECT_TRUE(exchange(9s, kStranger)[0].first) << "the cable was out";
+}
+
+TEST_F(PeerDelayTest, a_delay_beyond_a_second_is_none) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  static_cast<void>(hand_over(response(id, 10s), 1ms));
+  EXPECT_TRUE(hand_over(follow_up(id, 0s), 2ms).empty());
+  EXPECT_EQ(count(Counter::kAbsurdPeerDelay), 1U);
+}
+
+TEST_F(PeerDelayTest, answers_what_the_neighbour_asks_with_both_stamps_and_their_fractions) {
+  Message request = message(4711, PdelayReq{});
+  request.header.correction = Duration::from_ns(3.0);
+  const auto bytes = encode(request);
+  const auto read = port_.read(bytes->view());
+  ASSERT_TRUE(read.has_value());
+  ActionList actions;
+  peer_.on_message(*read, ours(1s) + Duration::from_ns(0.25), port_, actions);
+  const auto answers = of<SendMessage>(actions);
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].destination, Destination::kNeighbour);
+  const auto answer = decode(answers[0].bytes.view());
+  const auto& body = std::get<PdelayResp>(answer->body);
+  EXPECT_TRUE(answer->header.has(flag::kTwoStep));
+  EXPECT_EQ(answer->header.sequence_id, 4711);
+  EXPECT_EQ(body.requesting_port, kNeighbour);
+  EXPECT_EQ(body.request_receipt.since_epoch(), ours(1s).since_epoch());
+  EXPECT_EQ(answer->header.correction, Duration::from_ns(-0.25));
+
+  ActionList after;
+  peer_.on_sent(answers[0].id(), ours(1s + 2ms) + Duration::from_ns(0.5), port_, after);
+  const auto last = of<SendMessage>(after);
+  ASSERT_EQ(last.size(), 1U);
+  EXPECT_EQ(last[0].channel, Channel::kGeneral);
+  const auto follow_up = decode(last[0].bytes.view());
+  const auto& origin = std::get<PdelayRespFollowUp>(follow_up->body);
+  EXPECT_EQ(origin.requesting_port, kNeighbour);
+  EXPECT_EQ(origin.response_origin.since_epoch(), ours(1s + 2ms).since_epoch());
+  EXPECT_EQ(follow_up->header.correction, Duration::from_ns(3.5));
+}
+
+TEST_F(PeerDelayTest, two_neighbours_with_one_sequence_id_are_kept_apart) {
+  const auto first = of<SendMessage>(hand_over(message(5, PdelayReq{}), 1s));
+  const auto second = of<SendMessage>(hand_over(message(5, PdelayReq{}, kStranger), 1s));
+  ASSERT_EQ(first.size(), 1U);
+  ASSERT_EQ(second.size(), 1U);
+  ActionList actions;
+  peer_.on_sent(second[0].id(), ours(2s), port_, actions);
+  const auto sent = of<SendMessage>(actions);
+  ASSERT_EQ(sent.size(), 1U);
+  const auto read = decode(sent[0].bytes.view());
+  EXPECT_EQ(std::get<PdelayRespFollowUp>(read->body).requesting_port, kStranger);
+  peer_.on_stamp_missing(first[0].id(), port_);
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+  peer_.on_sent(first[0].id(), ours(2s), port_, actions);
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
+}
+
+TEST_F(PeerDelayTest, a_port_that_measures_end_to_end_answers_nothing) {
+  peer_.stop();
+  EXPECT_TRUE(hand_over(message(1, PdelayReq{}), 1s).empty());
+  EXPECT_EQ(count(Counter::kPdelayIgnored), 1U);
+}
+
+TEST_F(PeerDelayTest, allocates_nothing) {
+  const test::ForbidAllocation guard;
+  for (int i = 0; i < 20; ++i) {
+    ActionList actions;
+    peer_.on_timer(ours(1s * i), port_, actions);
+    peer_.on_sent({MessageType::kPdelayReq, static_cast<std::uint16_t>(i), {}}, ours(1s * i), port_,
+                  actions);
+    const auto answer = encode(response(static_cast<std::uint16_t>(i), 1s * i + kLink));
+    const auto last = encode(follow_up(static_cast<std::uint16_t>(i), 1s * i + kTurnAround));
+    for (const auto* bytes : {&*answer, &*last}) {
+      if (const auto read = port_.read(bytes->view())) {
+        peer_.on_message(*read, ours(1s * i + kTurnAround + kLink), port_, actions);
+      }
+    }
+  }
+}
+
+class CapablePort : public PeerDelayTest {
+ protected:
+  CapablePort() : PeerDelayTest(config()) {}
+  static PeerDelayConfig config() {
+    PeerDelayConfig config;
+    config.capability_needed = true;
+    config.highest = 800ns;
+    config.allowed_losses = 3;
+    return config;
+  }
+};
+
+TEST_F(CapablePort, needs_an_answer_and_a_rate) {
+  EXPECT_FALSE(peer_.capable());
+  static_cast<void>(exchange(0s));
+  EXPECT_FALSE(peer_.capable()) << "no rate yet";
+  static_cast<void>(exchange(1s));
+  EXPECT_TRUE(peer_.capable());
+}
+
+TEST_F(CapablePort, a_delay_above_the_threshold_is_a_bridge_that_speaks_no_802_1as) {
+  static_cast<void>(exchange(0s));
+  static_cast<void>(exchange(1s));
+  const auto id = ask(2s);
+  static_cast<void>(stamp(id, 2s));
+  const Nanoseconds left = 2s + 900ns + kTurnAround;
+  static_cast<void>(hand_over(response(id, 2s + 900ns), left + 900ns));
+  static_cast<void>(hand_over(follow_up(id, left), left + 1us));
+  EXPECT_FALSE(peer_.capable());
+  static_cast<void>(exchange(3s));
+  EXPECT_TRUE(peer_.capable());
+}
+
+TEST_F(CapablePort, is_lost_with_the_answers) {
+  static_cast<void>(exchange(0s));
+  static_cast<void>(exchange(1s));
+  for (int i = 2; i < 6; ++i) {
+    EXPECT_TRUE(peer_.capable()) << i;
+    static_cast<void>(stamp(ask(1s * i), 1s * i));
+  }
+  static_cast<void>(ask(6s));
+  EXPECT_FALSE(peer_.capable());
+}
+
+}  // namespace
+}  // namespace ftcs::ptp
