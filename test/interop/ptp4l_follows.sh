@@ -3,23 +3,27 @@
 # Debian's ptp4l (free_running, so it steers nothing) takes our time transmitter's messages over veth: an offset
 # each interval, no fault, and the rate error that our clock was given.
 #
-# test/interop/ptp4l_follows.sh [build/ftcs] [SECONDS]
+# test/interop/ptp4l_follows.sh [build/ftcs] [SECONDS] [UDPv4|UDPv6|L2] [E2E|P2P|hybrid|gptp]
 . "$(dirname "$0")/common.sh"
 ftcs=$(realpath "${1:-build/ftcs}")
 duration=${2:-12}
+transport=${3:-UDPv4}
+mechanism=${4:-E2E}
 skew_ppb=5000
 require ip ptp4l tshark python3
 make_network
+choose_profile "$transport" "$mechanism"
 # A free-running ptp4l prints once per freq_est_interval, which cannot be shorter than a second.
-start_ptp4l receiver "slaveOnly 1" "logSyncInterval -2" "freq_est_interval 0" "summary_interval -2"
+start_ptp4l receiver "slaveOnly 1" "logSyncInterval -2" "freq_est_interval 0" "summary_interval -2" \
+  "${theirs_too[@]}"
 start_capture
 
 clocks() { python3 -c 'import time; print(time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW), time.clock_gettime_ns(time.CLOCK_REALTIME))'; }
 before=$(clocks)
 code=0
 ip netns exec "$ours" "$ftcs" ptp -i "$our_interface" --role time-transmitter --skew ${skew_ppb}ppb \
-  --time_stamping software --tx_timestamp_timeout 50 --logAnnounceInterval -1 --logSyncInterval -2 \
-  --logMinDelayReqInterval -2 --duration "$duration" > "$folder/transmitter.log" 2> "$folder/errors.log" || code=$?
+  --time_stamping software --tx_timestamp_timeout 50 --logMinDelayReqInterval -2 "${ours_too[@]}" \
+  --logSyncInterval -2 --duration "$duration" > "$folder/transmitter.log" 2> "$folder/errors.log" || code=$?
 after=$(clocks)
 cat "$folder/transmitter.log"
 [ "$code" -eq 0 ] || fail "exit code $code"
