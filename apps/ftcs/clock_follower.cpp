@@ -60,7 +60,10 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
 
 std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, FreeRunningTime now,
                                                   std::optional<Duration> sync_interval) {
-  if (options_.peer_to_peer() && !link_delay_.known()) return std::nullopt;
+  if (options_.peer_to_peer() && !link_delay_.known()) {
+    waiting_ = emitted;
+    return std::nullopt;
+  }
   EventPair pair = emitted;
   pair.reference = pair.reference + link_delay_.value();
   const LocalTime local = clock_.local_at(pair.free_running);
@@ -110,6 +113,13 @@ std::optional<std::string> ClockFollower::on_clock_error(ClockError error) {
   if (error == ClockError::kGone || error == ClockError::kNotPermitted) return text;
   if (!clock_refuses_) log_(LogLevel::kWarning, "{}: {}", label_, text);
   return std::nullopt;
+}
+
+std::optional<std::string> ClockFollower::on_link_delay(Duration mean_link_delay, bool first,
+                                                        FreeRunningTime now,
+                                                        std::optional<Duration> sync_interval) {
+  if (!link_delay_.add(mean_link_delay, first) || !waiting_) return std::nullopt;
+  return on_pair(*std::exchange(waiting_, std::nullopt), now, sync_interval);
 }
 
 void ClockFollower::on_silence() {

@@ -25,11 +25,11 @@ class ClockFollower {
   /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
   [[nodiscard]] std::optional<std::string> on_pair(const EventPair& pair, FreeRunningTime now,
                                                    std::optional<Duration> sync_interval);
-  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, pairs are
-  /// left out. `first`: of another link.
-  void on_link_delay(Duration mean_link_delay, bool first) {
-    (void)link_delay_.add(mean_link_delay, first);
-  }
+  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, the
+  /// newest pair waits. `first`: of another link. Returns as on_pair() does.
+  [[nodiscard]] std::optional<std::string> on_link_delay(Duration mean_link_delay, bool first,
+                                                         FreeRunningTime now,
+                                                         std::optional<Duration> sync_interval);
   /// Once per turn of the loop.
   void on_silence();
   /// Another reference: what was learnt about the old one is void.
@@ -74,6 +74,7 @@ class ClockFollower {
   std::string label_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
+  std::optional<EventPair> waiting_{};  ///< for the first link delay
   SampleSummary recent_;
   SampleSummary since_lock_;
   bool in_holdover_ = false;

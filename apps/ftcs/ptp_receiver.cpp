@@ -62,7 +62,10 @@ void PtpReceiver::act(const ptp::Action& action) {
   if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) {
     on_pair(emitted->pair);
   } else if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
-    follower_.on_link_delay(delay->mean_link_delay, delay->first);
+    if (const auto wrong = follower_.on_link_delay(delay->mean_link_delay, delay->first, now(),
+                                                   core().sync_interval())) {
+      fail(*wrong);
+    }
   } else if (const auto* seen = std::get_if<ptp::TransmitterSeen>(&action)) {
     log()(LogLevel::kNotice, "port 1 ({}): new foreign master {}", options().interface,
           to_text(seen->port).view());

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -87,9 +88,16 @@ class World {
   static DisciplineConfig discipline_config(const Start& start) {
     DisciplineConfig config;
     config.servo.kind = start.servo;
+    config.servo.ftcs.converged_dwell = 4;  // as ftcs ptp
     if (start.mechanism == ptp::DelayMechanism::kPeerToPeer) {
       config.servo.two_way.fixed_path_delay = 0ns;
     }
+    return config;
+  }
+  static VirtualClockConfig clock_config() {
+    VirtualClockConfig config;
+    config.free_running = local_at(0ns);
+    config.local = LocalTime{Duration{kEpoch + 1ms}};
     return config;
   }
   static FreeRunningTime local_at(Nanoseconds time) {
@@ -134,6 +142,7 @@ class World {
       if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) follow(emitted->pair);
       if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
         EXPECT_TRUE(link_delay_.add(delay->mean_link_delay, delay->first));
+        if (waiting_) follow(*std::exchange(waiting_, std::nullopt));
       }
       const auto* sent = std::get_if<ptp::SendMessage>(&action);
       if (sent == nullptr) continue;
@@ -149,7 +158,12 @@ class World {
       });
     }
   }
+  /// As ftcs ptp does it: peer to peer, the newest pair waits for the first delay.
   void follow(EventPair pair) {
+    if (start_.mechanism == ptp::DelayMechanism::kPeerToPeer && !link_delay_.known()) {
+      waiting_ = pair;
+      return;
+    }
     pair.reference = pair.reference + link_delay_.value();
     static_cast<void>(discipline_.on_pair(pair));
   }
@@ -157,10 +171,10 @@ class World {
   Start start_;
   Nanoseconds now_{};
   SettableSource oscillator_;
-  VirtualClock clock_{oscillator_, VirtualClockConfig{.free_running = local_at(0ns),
-                                                      .local = LocalTime{Duration{kEpoch + 1ms}}}};
+  VirtualClock clock_{oscillator_, clock_config()};
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
+  std::optional<EventPair> waiting_;
   std::optional<ptp::TimeReceiver> receiver_;
   std::optional<ptp::TimeTransmitter> transmitter_;
   EventQueue<std::function<void()>> queue_;
