@@ -19,8 +19,6 @@ constexpr double kPlausibleDeviation = 0.5;
 constexpr double kLargestOffsetNs = 1099511627776.0;
 /// Cycles without a message: two lost in a row are bad luck, five are an outage.
 constexpr double kSilence = 5.0;
-/// The delay shifts the moment to which a message belongs; more than this is not believed there.
-constexpr double kLongestDelayNs = 1e9;
 
 adaptive::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
   if (!config.fixed_path_delay.has_value()) return {};
@@ -72,26 +70,26 @@ void BasicAdaptiveServo<Grid>::forget() noexcept {
   started_ = false;
 }
 
-/// Time passes by the reference, whose stamps do not depend on the path; unless it has jumped
-/// against the free-running clock.
+/// A message belongs to the moment of its reference stamp. A path of D reference ns then adds
+/// sign D r, r = free running per reference, exactly: d = D r is the constant that the filters see,
+/// and no time depends on an estimate. A delay known in reference time shifts the moment instead.
+/// Time passes by the reference unless it has jumped against the free-running clock.
 template <class Grid>
 Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
-  const double delay = std::clamp(estimator_.estimate().d, -kLongestDelayNs, kLongestDelayNs);
-  const ReferenceTime event = pair.reference + Duration::from_ns(sign * delay);
+  const adaptive::KnownDelay& known = estimator_.known_delay();
+  const double shift = known.known() ? sign * known.mean_ns : 0.0;
+  const ReferenceTime event = pair.reference + Duration::from_ns(shift);
   Observation seen;
   seen.sign = sign;
   if (!started_) {
     base_ = raw;
     started_ = true;
   } else {
-    const double interval = meter_.interval_ns();
-    const double by_reference = (event - event_).ns();
-    const double by_oscillator = (pair.free_running - previous_).ns();
-    const bool jumped =
-        std::abs(by_reference - by_oscillator) > 0.5 * (std::abs(by_oscillator) + interval);
-    seen.elapsed = (jumped ? by_oscillator : by_reference) / interval;
+    const double elapsed =
+        order_.jumped() ? (pair.free_running - previous_).ns() : (event - event_).ns();
+    seen.elapsed = elapsed / meter_.interval_ns();
   }
   seen.z = (raw - base_).ns();
   event_ = event;
@@ -125,7 +123,11 @@ ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
   if (order == Order::kNewEpoch) forget();
   const double longer = meter_.observe(pair);
   if (longer != 1.0) estimator_.rescale_time(longer);
-  const double credit = estimator_.update(pair.direction, observe(pair));
+  double credit = estimator_.update(pair.direction, observe(pair));
+  if (estimator_.count() == 0) {  // it has given up: this message is the first
+    started_ = false;
+    credit = estimator_.update(pair.direction, observe(pair));
+  }
   rebase();
   ServoUpdate result;
   if (ready()) result = steer(now);
@@ -171,7 +173,9 @@ ServoSnapshot BasicAdaptiveServo<Grid>::describe(const Belief& belief,
   if (state == ServoState::kUnlocked) return snapshot;
   snapshot.offset_known = true;
   snapshot.offset = Duration::from_ns(belief.offset_ns);
-  snapshot.path_delay = Duration::from_ns(estimator_.estimate().d);
+  const double free_per_reference =
+      estimator_.known_delay().known() ? 1.0 : 1.0 + belief.rate_deviation;
+  snapshot.path_delay = Duration::from_ns(estimator_.estimate().d / free_per_reference);
   snapshot.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
   snapshot.offset_gain = estimator_.gain();
   snapshot.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);

@@ -66,7 +66,7 @@ class BasicAdaptiveServo {
   bool started_ = false;
   Duration base_{};             ///< first z: keeps the states small
   FreeRunningTime previous_{};  ///< of the last message
-  ReferenceTime event_{};       ///< of the last message, reference time at the local clock
+  ReferenceTime event_{};       ///< reference time to which the last message belongs
   Belief latest_{};
   ServoState state_ = ServoState::kUnlocked;
 };

@@ -28,7 +28,8 @@ constexpr std::uint32_t kLearnFrom = 16;
 constexpr double kEvidenceLimit = 12.0;
 constexpr double kEvidenceMemory = 4000.0;
 constexpr std::uint32_t kYoung = 100;
-constexpr std::uint8_t kRejectedInARow = 10;
+constexpr std::uint8_t kRejectedInARow = 8;
+constexpr std::uint8_t kRejectedAtLeast = 3;
 constexpr double kRejected = 0.1;
 constexpr double kSmallestScale = 1e-4;
 constexpr double kSmallestSquare = 1e-30;
@@ -43,9 +44,16 @@ constexpr double kWildnessCost = 1.0;
 constexpr double kCalmGain = 0.12;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
-constexpr std::uint8_t kOpinionPeriod = 8;
-/// Rejections in a row, of one direction, after which it is asked every time for a while.
-constexpr std::uint8_t kSurprises = 3;
+constexpr std::uint8_t kOpinionPeriod = 4;
+constexpr std::uint8_t kOpinionWhile = 16;
+/// Residuals this many times below the innovations are not chance: with f degrees of freedom the
+/// probability of such luck is about (f / 2 k^2)^(f/2) / Gamma(f/2 + 1), below 1e-6 with sixteen
+/// messages. Filters that have only just started again have less to lose.
+constexpr double kContradiction = 10.0;
+constexpr double kYoungContradiction = 5.0;
+/// Rejections in a row of one direction, or innovations that hardly differ, after which it is asked
+/// every time for a while.
+constexpr int kSurprises = 3;
 
 std::size_t index_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 0 : 1;
@@ -135,12 +143,15 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   connect_second_direction(direction);
   ++count_;
   ++since_change_;
-  bank_.predict(elapsed);
+  if (!bank_.predict(elapsed, best_) && count_ > kMixFrom) {
+    restart();
+    return 0.0;
+  }
   const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
   const Innovations innovations =
       bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
   bank_.correct(seen, scale_, innovations);
-  if (!bank_.healthy()) {  // absurd input, or rounding after absurd input
+  if (!bank_.healthy() && !bank_.heal(best_)) {  // absurd input
     restart();
     return 0.0;
   }
@@ -156,8 +167,8 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
         std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
     detect_changes(innovations.log_density);
   }
-  rejected_[side] = credit < kRejected ? static_cast<std::uint8_t>(rejected_[side] + 1) : 0;
-  if (rejected_[side] >= kRejectedInARow) leave_gate(side, innovation);
+  follow_gate(side, credit, innovation);
+  if (count_ == 0) return 0.0;
   if (weight_sum_ > 0.0 || count_ > kEvidenceFrom) {
     const double variance = innovations.variance[best_] / (scale_ * scale_);
     residuals_.push(std::abs(innovations.centred[best_]) / std::sqrt(variance));
@@ -183,12 +194,15 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
 template <class Grid>
 void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innovation) noexcept {
   second_opinion_.push(seen, innovation);
-  if (std::max(rejected_[0], rejected_[1]) >= kSurprises) surprise_ = 2 * kOpinionPeriod;
+  const int rejected = std::max(rejected_[0], rejected_[1]);
+  if (rejected >= kSurprises || second_opinion_.serial() >= kSurprises) surprise_ = kOpinionWhile;
   const bool due = count_ <= kOpinionOften || count_ % kOpinionPeriod == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
   const bool delay_free = two_way() && !known_delay_.known();
-  const FreshFit fit = second_opinion_.consult(delay_free, known_delay_.mean_ns);
+  const bool young = count_ <= kOpinionOften && second_opinion_.full();
+  const double contradiction = young ? kYoungContradiction : kContradiction;
+  const FreshFit fit = second_opinion_.consult({delay_free, known_delay_.mean_ns, contradiction});
   if (fit.better) start_again(fit);
 }
 
@@ -207,6 +221,7 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   shape_ = {};
   late_outliers_ = {kOutlierStart, kOutlierStart};
   rejected_ = {};
+  taken_ = {};
   residuals_.clear();
   forget_evidence();
   second_opinion_.adopt(start);
@@ -263,11 +278,25 @@ void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
   }
 }
 
-/// Ten messages of one direction in a row cannot all be outliers: the gate opens.
+/// Eight messages of one direction in a row cannot all be outliers, nor can more than were ever
+/// taken: the gate opens.
 template <class Grid>
-void Estimator<Grid>::leave_gate(std::size_t side, double innovation) noexcept {
-  rejected_[side] = 0;
+void Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
+  std::uint8_t& rejected = rejected_[side];
+  std::uint8_t& taken = taken_[side];
+  if (credit >= kRejected) {
+    rejected = 0;
+    taken = std::min<std::uint8_t>(static_cast<std::uint8_t>(taken + 1), kRejectedInARow);
+    return;
+  }
+  ++rejected;
+  if (rejected < std::max(kRejectedAtLeast, std::min(kRejectedInARow, taken))) return;
+  rejected = 0;
   const double doubt = innovation * innovation / (scale_ * scale_);
+  if (!(doubt < Bank::kLargestVariance)) {  // nothing of what was believed is left
+    restart();
+    return;
+  }
   const bool delay_free = two_way() && !known_delay_.known();
   bank_.for_each([doubt, delay_free](Estimate& e) {
     e.xx += doubt;
@@ -323,7 +352,11 @@ template <class Grid>
 void Estimator<Grid>::follow_scale() noexcept {
   robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
   if (weight_sum_ > 4.0 && squares_[best_] / weight_sum_ > 9.0 * robust_scale_ * robust_scale_) {
+    // Old gross errors are all that the evidence tells. The model that has coped is right by now;
+    // without evidence any other might be chosen.
     forget_evidence();
+    const Estimate coped = bank_.estimate(best_);
+    bank_.for_each([&coped](Estimate& e) { e = coped; });
   }
   // Fourth root of both directions' variances: the scale is their geometric mean.
   double learnt = 1.0;

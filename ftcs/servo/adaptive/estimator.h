@@ -67,7 +67,7 @@ class Estimator {
   void connect_second_direction(Direction direction) noexcept;
   void gather_evidence(const Innovations& innovations) noexcept;
   void detect_changes(const Row& log_density) noexcept;
-  void leave_gate(std::size_t side, double innovation) noexcept;
+  void follow_gate(std::size_t side, double credit, double innovation) noexcept;
   void choose() noexcept;
   void mix() noexcept;
   void follow_scale() noexcept;
@@ -88,7 +88,8 @@ class Estimator {
   std::array<DelayShape, 2> shape_{};
   std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};
   std::array<bool, 2> seen_{};
-  std::array<std::uint8_t, 2> rejected_{};
+  std::array<std::uint8_t, 2> rejected_{};  ///< in a row
+  std::array<std::uint8_t, 2> taken_{};     ///< up to as many as would open the gate
   SortedWindow<Grid::kResidualWindow> residuals_{};
   SecondOpinion<Grid::kOpinionWindow> second_opinion_{};
 

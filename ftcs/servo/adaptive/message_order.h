@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -22,6 +24,7 @@ class MessageOrder {
                       message.free_running.since_epoch().floor_ns()};
     Side& side = sides_[index_of(message.direction)];
     if (!side.seen || newer(pair, side.latest)) {
+      jumped_ = side.seen && jump(side.latest, pair);
       side = {pair, pair, true, 0};
       return Verdict::kNews;
     }
@@ -42,6 +45,9 @@ class MessageOrder {
     return older ? Verdict::kDuplicate : Verdict::kImplausible;
   }
   void reset() noexcept { sides_ = {}; }
+  /// Whether one clock has jumped against the other before the latest news: their advances since
+  /// the message before, of the same direction, differ by more than half.
+  [[nodiscard]] bool jumped() const noexcept { return jumped_; }
 
  private:
   /// Whole nanoseconds suffice to tell two messages apart.
@@ -68,7 +74,16 @@ class MessageOrder {
     return a.reference == b.reference && a.free_running == b.free_running;
   }
 
+  [[nodiscard]] static bool jump(const Stamps& from, const Stamps& to) noexcept {
+    const double reference =
+        static_cast<double>(to.reference) - static_cast<double>(from.reference);
+    const double free =
+        static_cast<double>(to.free_running) - static_cast<double>(from.free_running);
+    return std::abs(reference - free) > 0.5 * std::max(reference, free);
+  }
+
   std::array<Side, 2> sides_{};
+  bool jumped_ = false;
 };
 
 }  // namespace ftcs::adaptive

@@ -71,9 +71,11 @@ class ModelBank {
     dd_.fill(estimate.dd);
   }
 
-  void predict(double elapsed) noexcept {
+  /// False: nothing is left of what the model `trusted` knew.
+  [[nodiscard]] bool predict(double elapsed, std::size_t trusted) noexcept {
     const double t = elapsed;
     const double span = std::abs(elapsed);
+    double largest = 0.0;
     for (std::size_t i = 0; i < kSize; ++i) {
       const NoiseModel& model = Grid::kModels[i];
       x_[i] += y_[i] * t;
@@ -83,7 +85,12 @@ class ModelBank {
       xd_[i] += t * yd_[i];
       yy_[i] += model.random_walk_fm * span;
       dd_[i] += (kDelayWalk + model.delay_walk) * span;
+      largest = std::max(largest, std::max(std::max(xx_[i], yy_[i]), dd_[i]));
     }
+    if (largest <= kLargestVariance) return true;
+    const bool lost = !(std::max(xx_[trusted], yy_[trusted]) <= kLargestVariance);
+    contain();
+    return !lost;
   }
 
   /// Judges one observation; without `gate` nothing is taken for an outlier.
@@ -150,16 +157,30 @@ class ModelBank {
     yd_[i] = e.yd;
     dd_[i] = e.dd;
   }
-  /// Every state finite and every variance positive.
+  /// Every state finite and every covariance positive.
   [[nodiscard]] bool healthy() const noexcept {
     double sum = 0.0;
     double least = 1.0;
     for (std::size_t i = 0; i < kSize; ++i) {
-      // Not finite times zero is not a number, which no comparison below survives.
-      sum += 0.0 * (x_[i] + y_[i] + d_[i] + xx_[i] + yy_[i] + dd_[i] + xy_[i] + xd_[i] + yd_[i]);
-      least = std::min(least, std::min(std::min(xx_[i], yy_[i]), dd_[i] + kDelayWalk));
+      const Health health = health_of(i);
+      sum += health.finite;
+      least = std::min(least, health.positive);
     }
     return sum == 0.0 && least > 0.0;
+  }
+  /// Models that rounding or absurd input has broken take the state of `donor`, or of the first
+  /// that is whole. False: there is none.
+  [[nodiscard]] bool heal(std::size_t donor) noexcept {
+    const auto whole = [this](std::size_t i) {
+      const Health health = health_of(i);
+      return health.finite == 0.0 && health.positive > 0.0;
+    };
+    for (std::size_t i = 0; i < kSize && !whole(donor); ++i) donor = i;
+    if (!whole(donor)) return false;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      if (!whole(i)) set(i, estimate(donor));
+    }
+    return true;
   }
   /// The same change to every model.
   template <class Change>
@@ -198,7 +219,37 @@ class ModelBank {
     return mean;
   }
 
+  /// Beyond it a model knows nothing, and its variance after the next message would be rounding.
+  static constexpr double kLargestVariance = 1e11;
+
  private:
+  /// `finite` is zero or not a number; `positive` is the least of what has to be above zero.
+  struct Health {
+    double finite, positive;
+  };
+  [[nodiscard]] Health health_of(std::size_t i) const noexcept {
+    // Not finite times zero is not a number, which no comparison survives.
+    const double finite =
+        0.0 * (x_[i] + y_[i] + d_[i] + xx_[i] + yy_[i] + dd_[i] + xy_[i] + xd_[i] + yd_[i]);
+    const double minors = std::min(xx_[i] * yy_[i] - xy_[i] * xy_[i],
+                                   xx_[i] * (dd_[i] + kDelayWalk) - xd_[i] * xd_[i]);
+    return {finite, std::min(std::min(xx_[i], yy_[i]), std::min(dd_[i] + kDelayWalk, minors))};
+  }
+  /// A covariance that is too large shrinks as a whole, so that it stays a covariance.
+  void contain() noexcept {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double largest = std::max(std::max(xx_[i], yy_[i]), dd_[i]);
+      if (largest <= kLargestVariance) continue;
+      const double share = kLargestVariance / largest;
+      xx_[i] *= share;
+      xy_[i] *= share;
+      xd_[i] *= share;
+      yy_[i] *= share;
+      yd_[i] *= share;
+      dd_[i] *= share;
+    }
+  }
+
   /// Even the calmest path changes in the end; keeps the covariance of d from collapsing.
   static constexpr double kDelayWalk = 1e-9;
   /// Two sigma: below it the outlier hypothesis cannot win, so its density is not worth computing.

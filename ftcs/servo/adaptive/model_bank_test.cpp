@@ -77,7 +77,7 @@ TEST(ModelBank, every_model_is_the_textbook_filter) {
     time += dt;
     const double sign = random() % 2 == 0 ? 1.0 : -1.0;
     const double z = 300.0 * time + sign * 7000.0 + kScale * normal(random);
-    bank.predict(dt);
+    ASSERT_TRUE(bank.predict(dt, 0));
     const auto innovations = bank.judge({sign, dt, z}, DelayShape{}, kScale, {}, false);
     bank.correct({sign, dt, z}, kScale, innovations);
     for (Textbook& oracle : oracles) {

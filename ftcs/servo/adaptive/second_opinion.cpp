@@ -4,32 +4,65 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace ftcs::adaptive {
 namespace {
 
 /// Concentration steps per start: convergence is that fast on a line.
 constexpr int kSteps = 3;
-/// Residuals this many times below the innovations are not chance: with f degrees of freedom the
-/// probability of such luck is about (f / 2 k^2)^(f/2) / Gamma(f/2 + 1), below 1e-6 with sixteen
-/// messages. Fewer messages need more.
-constexpr double kContradiction = 10.0;
-/// Innovations below this many times the roughness need no fit to be believed.
-constexpr double kWorth = 4.0;
+/// No fit leaves much less than the roughness, which is the larger part of the noise; where
+/// innovations are below this part of the contradiction times the roughness, save the work.
+constexpr double kWorth = 0.4;
+/// Cycles. No line is worth fitting across it, and the times before would cost digits.
+constexpr double kLongestGap = 1e5;
+/// Innovations of one direction that differ by less than this part are no noise.
+constexpr double kSameInnovation = 0.25;
 constexpr double kFullFreedom = 9.0;
+/// Of one direction: so many in a row cannot all be outliers.
+constexpr std::size_t kManyMessages = 6;
+/// Luck in one direction alone is more frequent.
+constexpr double kOneSided = 3.0;
 /// Below this number of spare messages a fit proves nothing.
 constexpr std::size_t kLeastFreedom = 3;
 /// A fit may be exact (simulated or coarse stamps); the noise is not.
 constexpr double kSmallestScale = 1e-4;
 
+/// Brings the `wanted` smallest of `count` values to the front, in order. For the few values here
+/// selection is as quick as anything, and needs nothing of a C library (std::nth_element: memmove).
+template <class Value, class Less>
+void smallest_first(Value* values, std::size_t count, std::size_t wanted, Less less) noexcept {
+  for (std::size_t k = 0; k < wanted; ++k) {
+    std::size_t least = k;
+    for (std::size_t j = k + 1; j < count; ++j) {
+      if (less(values[j], values[least])) least = j;
+    }
+    std::swap(values[k], values[least]);
+  }
+}
+
+/// The value of the given rank among the first `count`, which are reordered; infinite if there are
+/// none.
+template <std::size_t Capacity>
+double ranked(std::array<double, Capacity>& values, std::size_t count, std::size_t rank) noexcept {
+  if (count == 0) return std::numeric_limits<double>::infinity();
+  smallest_first(values.data(), count, rank + 1, [](double x, double y) { return x < y; });
+  return values[rank];
+}
+
 }  // namespace
 
 template <std::size_t Capacity>
 void SecondOpinion<Capacity>::push(const Observation& seen, double innovation) noexcept {
+  if (!(std::abs(seen.elapsed) < kLongestGap)) clear();
   time_ += seen.elapsed;
   messages_[next_] = {time_, seen.z, seen.sign, innovation};
   next_ = next_ + 1 == Capacity ? 0 : next_ + 1;
   size_ = std::min(size_ + 1, Capacity);
+  const std::size_t side = seen.sign > 0.0 ? 0 : 1;
+  const bool same = std::abs(innovation - latest_[side]) < kSameInnovation * std::abs(innovation);
+  alike_[side] = same ? static_cast<std::uint8_t>(std::min(alike_[side] + 1, 100)) : 0;
+  latest_[side] = innovation;
 }
 
 template <std::size_t Capacity>
@@ -121,9 +154,8 @@ Estimate SecondOpinion<Capacity>::through(std::size_t a, std::size_t b, bool del
       const Message& m = messages_[k];
       if (m.sign != first.sign) others[count++] = m.z - line.y * (m.time - time_);  // x - sign d
     }
-    const auto middle = others.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(others.begin(), middle, others.begin() + static_cast<std::ptrdiff_t>(count));
-    line.d = first.sign * (level - *middle) / 2.0;
+    const double middle = ranked(others, count, count / 2);
+    if (count > 0) line.d = first.sign * (level - middle) / 2.0;
   }
   line.x = level - first.sign * line.d;
   return line;
@@ -148,36 +180,45 @@ typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
     }
     const std::size_t count = (end - begin) - (end - begin) / 4;
     if (count == 0) continue;
-    const auto first = kept.members.begin() + static_cast<std::ptrdiff_t>(begin);
-    std::nth_element(
-        first, first + static_cast<std::ptrdiff_t>(count - 1),
-        kept.members.begin() + static_cast<std::ptrdiff_t>(end),
-        [&squares](std::uint8_t x, std::uint8_t y) { return squares[x] < squares[y]; });
+    smallest_first(&kept.members[begin], end - begin, count,
+                   [&squares](std::uint8_t x, std::uint8_t y) { return squares[x] < squares[y]; });
     kept.count += count;
     for (std::size_t k = begin; k < kept.count; ++k) kept.squares += squares[kept.members[k]];
   }
   return kept;
 }
 
-/// The value of the given rank among the first `count`, which are reordered; infinite if there are
-/// none.
+/// Size of the innovations of one direction. Typical is infinite for a direction that is not there,
+/// least is zero for one of few messages.
 template <std::size_t Capacity>
-double ranked(std::array<double, Capacity>& values, std::size_t count, std::size_t rank) noexcept {
-  if (count == 0) return std::numeric_limits<double>::infinity();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(rank);
-  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
-  return *middle;
-}
-
-/// Median size of the innovations of one direction.
-template <std::size_t Capacity>
-double SecondOpinion<Capacity>::typical_innovation(double sign) const noexcept {
+typename SecondOpinion<Capacity>::Sizes SecondOpinion<Capacity>::innovations(
+    double sign) const noexcept {
   std::array<double, Capacity> sizes{};
   std::size_t count = 0;
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < size_; ++k) {
-    if (messages_[k].sign == sign) sizes[count++] = std::abs(messages_[k].innovation);
+    if (messages_[k].sign != sign) continue;
+    const double size = std::abs(messages_[k].innovation);
+    sizes[count++] = size;
+    least = std::min(least, size);
   }
-  return ranked(sizes, count, count / 2);
+  return {ranked(sizes, count, count / 2), count < kManyMessages ? 0.0 : least};
+}
+
+/// Root mean square of what `line` leaves of the kept messages of one direction.
+template <std::size_t Capacity>
+double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
+                                        double sign) const noexcept {
+  double squares = 0.0;
+  double members = 0.0;
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    const Message& m = messages_[kept.members[k]];
+    if (m.sign != sign) continue;
+    const double r = residual(m, line);
+    squares += r * r;
+    members += 1.0;
+  }
+  return std::max(kSmallestScale, std::sqrt(squares / std::max(members, 1.0)));
 }
 
 /// Distance of a message from the chord of its neighbours of the same direction, lower quartile:
@@ -201,34 +242,23 @@ double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
   return count == 0 ? 0.0 : ranked(distances, count, count / 4);
 }
 
-/// No fit leaves much less than the roughness; where innovations are of that size, save the work.
+/// Innovations far above `forward` and `backward`: the typical ones of both directions, or one that
+/// is merely loaded would do; or all of one direction.
 template <std::size_t Capacity>
-bool SecondOpinion<Capacity>::worth_a_fit(double sign) const noexcept {
-  return typical_innovation(sign) > kWorth * roughness(sign);
-}
-
-/// Typical innovation of one direction over the residual scale that the fit leaves in it; infinite
-/// for a direction that is not there.
-template <std::size_t Capacity>
-double SecondOpinion<Capacity>::contradiction(const Kept& kept, const Estimate& line,
-                                              double sign) const noexcept {
-  const double typical = typical_innovation(sign);
-  double squares = 0.0;
-  double members = 0.0;
-  for (std::size_t k = 0; k < kept.count; ++k) {
-    const Message& m = messages_[kept.members[k]];
-    if (m.sign != sign) continue;
-    const double r = residual(m, line);
-    squares += r * r;
-    members += 1.0;
-  }
-  return typical / std::max(kSmallestScale, std::sqrt(squares / std::max(members, 1.0)));
+bool SecondOpinion<Capacity>::contradicted(double forward, double backward) const noexcept {
+  const Sizes ahead = innovations(1.0);
+  const Sizes back = innovations(-1.0);
+  return (ahead.typical > forward && back.typical > backward) ||
+         ahead.least > kOneSided * forward || back.least > kOneSided * backward;
 }
 
 template <std::size_t Capacity>
-FreshFit SecondOpinion<Capacity>::consult(bool delay_free, double known_delay) const noexcept {
+FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const noexcept {
+  const bool delay_free = question.delay_free;
+  const double known_delay = question.known_delay;
   FreshFit result;
-  if (!worth_a_fit(1.0) || !worth_a_fit(-1.0)) return result;
+  const double worth = kWorth * question.contradiction;
+  if (!contradicted(worth * roughness(1.0), worth * roughness(-1.0))) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
   Kept best_kept;
@@ -255,10 +285,9 @@ FreshFit SecondOpinion<Capacity>::consult(bool delay_free, double known_delay) c
   if (best < 0.0) return result;
   const double freedom = static_cast<double>(best_kept.count - unknowns);
   result.scale_ns = std::max(kSmallestScale, std::sqrt(best / freedom));
-  const double needed = kContradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
-  // In both directions, or one that is merely loaded would do.
-  result.better = contradiction(best_kept, result.estimate, 1.0) > needed &&
-                  contradiction(best_kept, result.estimate, -1.0) > needed;
+  const double needed = question.contradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
+  result.better = contradicted(needed * left_by(result.estimate, best_kept, 1.0),
+                               needed * left_by(result.estimate, best_kept, -1.0));
   return result;
 }
 

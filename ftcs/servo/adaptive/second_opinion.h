@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,6 +18,14 @@ struct FreshFit {
   double scale_ns = 0.0;
 };
 
+struct OpinionQuestion {
+  bool delay_free = true;  ///< estimate d too; otherwise it is
+  double known_delay = 0.0;
+  /// The fit is better if it leaves residuals so many times below the innovations; with few
+  /// messages more is needed.
+  double contradiction = 10.0;
+};
+
 /// Keeps the last messages and, now and then, fits them anew without any memory:
 ///
 ///     z = x + y t + sign d,   least trimmed squares over three quarters of them
@@ -29,8 +38,12 @@ template <std::size_t Capacity>
 class SecondOpinion {
  public:
   void push(const Observation& seen, double innovation) noexcept;
-  /// `delay_free`: estimate d too; otherwise the delay is `known_delay`.
-  [[nodiscard]] FreshFit consult(bool delay_free, double known_delay) const noexcept;
+  /// Whether all its places are taken.
+  [[nodiscard]] bool full() const noexcept { return size_ == Capacity; }
+  /// How many innovations in a row, of either direction, hardly differ from their predecessor:
+  /// noise is not like that.
+  [[nodiscard]] int serial() const noexcept { return std::max(alike_[0], alike_[1]); }
+  [[nodiscard]] FreshFit consult(const OpinionQuestion& question) const noexcept;
   /// The filters start again from `line`: what they had thought of these messages is void.
   void adopt(const Estimate& line) noexcept;
   void clear() noexcept { *this = SecondOpinion{}; }
@@ -55,14 +68,19 @@ class SecondOpinion {
   [[nodiscard]] Estimate through(std::size_t a, std::size_t b, bool delay_free,
                                  double known_delay) const noexcept;
   [[nodiscard]] Kept closest(const Estimate& line) const noexcept;
-  [[nodiscard]] double typical_innovation(double sign) const noexcept;
+  struct Sizes {
+    double typical = 0.0;
+    double least = 0.0;
+  };
+  [[nodiscard]] Sizes innovations(double sign) const noexcept;
+  [[nodiscard]] double left_by(const Estimate& line, const Kept& kept, double sign) const noexcept;
   [[nodiscard]] double roughness(double sign) const noexcept;
-  [[nodiscard]] bool worth_a_fit(double sign) const noexcept;
-  [[nodiscard]] double contradiction(const Kept& kept, const Estimate& line,
-                                     double sign) const noexcept;
+  [[nodiscard]] bool contradicted(double forward, double backward) const noexcept;
   [[nodiscard]] double residual(const Message& message, const Estimate& line) const noexcept;
 
   std::array<Message, Capacity> messages_{};
+  std::array<double, 2> latest_{};  ///< innovation of each direction
+  std::array<std::uint8_t, 2> alike_{};
   std::size_t size_ = 0;
   std::size_t next_ = 0;
   double time_ = 0.0;
@@ -73,7 +91,9 @@ template <>
 class SecondOpinion<0> {
  public:
   void push(const Observation&, double) noexcept {}
-  [[nodiscard]] FreshFit consult(bool, double) const noexcept { return {}; }
+  [[nodiscard]] bool full() const noexcept { return true; }
+  [[nodiscard]] int serial() const noexcept { return 0; }
+  [[nodiscard]] FreshFit consult(const OpinionQuestion&) const noexcept { return {}; }
   void adopt(const Estimate&) noexcept {}
   void rescale_time(double) noexcept {}
   void shift_offset(double) noexcept {}

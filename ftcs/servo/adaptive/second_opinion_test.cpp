@@ -34,7 +34,7 @@ class SecondOpinionTest : public ::testing::Test {
 
 TEST_F(SecondOpinionTest, finds_the_line_under_outliers_when_the_filters_are_lost) {
   for (int i = 0; i < 16; ++i) feed(i == 3 || i == 8 || i == 14 ? 1e5 : 0.0, 2e4);
-  const FreshFit fit = opinion_.consult(true, 0.0);
+  const FreshFit fit = opinion_.consult({true, 0.0});
   EXPECT_TRUE(fit.better);
   EXPECT_NEAR(fit.estimate.x, kX, 400.0);
   EXPECT_NEAR(fit.estimate.y, kY, 100.0);
@@ -44,7 +44,7 @@ TEST_F(SecondOpinionTest, finds_the_line_under_outliers_when_the_filters_are_los
 
 TEST_F(SecondOpinionTest, covariance_is_that_of_least_squares) {
   for (int i = 0; i < 16; ++i) feed(0.0, 2e4);
-  const FreshFit fit = opinion_.consult(true, 0.0);
+  const FreshFit fit = opinion_.consult({true, 0.0});
   // Six of eight messages a direction are kept. Newest point of a line through N uniform points:
   // variance about 4 / N; the delay: 1 / N.
   EXPECT_NEAR(fit.estimate.xx, 4.0 / 12.0, 0.2);
@@ -57,7 +57,7 @@ TEST_F(SecondOpinionTest, agrees_with_filters_that_see_the_noise_as_it_is) {
     opinion_.clear();
     count_ = 0;
     for (int i = 0; i < 16; ++i) feed(0.0, 100.0 * normal_(random_));
-    ASSERT_FALSE(opinion_.consult(true, 0.0).better);
+    ASSERT_FALSE(opinion_.consult({true, 0.0}).better);
   }
 }
 
@@ -70,13 +70,13 @@ TEST_F(SecondOpinionTest, a_loaded_direction_alone_is_no_contradiction) {
       const double late = i % 2 == 0 ? queue(random_) : 0.0;
       feed(late, late + 100.0 * normal_(random_));
     }
-    ASSERT_FALSE(opinion_.consult(true, 0.0).better);
+    ASSERT_FALSE(opinion_.consult({true, 0.0}).better);
   }
 }
 
 TEST_F(SecondOpinionTest, has_no_opinion_on_a_few_messages) {
   for (int i = 0; i < 6; ++i) feed(0.0, 1e9);
-  EXPECT_FALSE(opinion_.consult(true, 0.0).better);
+  EXPECT_FALSE(opinion_.consult({true, 0.0}).better);
 }
 
 TEST_F(SecondOpinionTest, one_direction_with_a_known_delay_suffices) {
@@ -84,7 +84,7 @@ TEST_F(SecondOpinionTest, one_direction_with_a_known_delay_suffices) {
     opinion_.push({1.0, i == 0 ? 0.0 : 1.0, kX + kY * (i - 15) + kD + 100.0 * normal_(random_)},
                   1e6);
   }
-  const FreshFit fit = opinion_.consult(false, kD);
+  const FreshFit fit = opinion_.consult({false, kD});
   EXPECT_TRUE(fit.better);
   EXPECT_NEAR(fit.estimate.x, kX, 300.0);
   EXPECT_DOUBLE_EQ(fit.estimate.d, kD);
