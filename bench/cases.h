@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "bench/ethercat_cases.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/measurement/outlier_gate.h"
@@ -177,6 +178,9 @@ void for_each_case(const Visit& visit) {
   visit("decode_follow_up", DecodeCase<ptp::FollowUp>{});
   visit("decode_delay_resp", DecodeCase<ptp::DelayResp>{});
   visit("decode_announce", DecodeCase<ptp::Announce>{});
+  visit("ethercat_wire_alone", EthercatWireCase{});
+  visit("ethercat_cycle_ftcs", EthercatCycleCase<CycleLaw::kFtcs>{});
+  visit("ethercat_cycle_adaptive", EthercatCycleCase<CycleLaw::kAdaptive>{});
 }
 
 }  // namespace ftcs::bench

@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/ethercat/contour_live.h"
 #include "apps/ftcs/experiment_files.h"
 #include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
@@ -28,6 +29,7 @@ struct PaperOptions {
   std::string csv;
   std::string html;
   bool quiet = false;
+  bool live = false;
 };
 
 /// Fewer would not carry the tolerances (1.5 % of an ensemble).
@@ -83,7 +85,16 @@ int reproduce_section5(const PaperOptions& options) {
   control.stop = &interrupt.flag();
   control.progress = [&](std::size_t done, std::size_t total) { progress.show(done, total); };
   const std::uint64_t seeds = options.seeds != 0 ? options.seeds : kSection5Seeds;
-  const experiment::CycleResult result = experiment::run_table6(seeds, control);
+  experiment::CycleResult result = experiment::run_table6(seeds, control);
+  if (!interrupt.flag()) {
+    control.progress = nullptr;
+    experiment::add_contour(result, experiment::run_contours({}, 1, control));
+  }
+  if (options.live && !interrupt.flag()) {
+    auto live = run_live_contours([&interrupt] { return interrupt.flag().load(); });
+    if (!live) return kRuntimeError;
+    result.live_contour = std::move(*live);
+  }
   if (!options.quiet) fmt::print("{}\n", cycle_console(result));
   fmt::print("{}\n", result.passed() ? "Every demanded tolerance holds."
                                      : "A demanded tolerance does not hold.");
@@ -114,7 +125,14 @@ void add_paper_command(CLI::App& app, int& exit_code) {
   command->add_option("--csv", options->csv, "write the tables to this file");
   command->add_option("--html", options->html, "write a report with plots to this file");
   command->add_flag("-q,--quiet", options->quiet, "print the verdict alone");
+  command->add_flag("--live", options->live,
+                    "section 5: draw the circle over a virtual link too, a minute");
   command->callback([options, &exit_code] {
+    if (options->live && options->section != "5") {
+      fmt::print(stderr, "ftcs paper: --live belongs to --section 5\n");
+      exit_code = kUsageError;
+      return;
+    }
     exit_code = options->section == "5" ? reproduce_section5(*options) : reproduce(*options);
   });
 }

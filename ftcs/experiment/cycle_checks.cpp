@@ -78,6 +78,35 @@ std::vector<PaperCheckResult> judge_table6(const CycleResult& result) {
   return checks;
 }
 
+void add_contour(CycleResult& result, ContourResult contour) {
+  const auto demand = [&result](const ContourRow& row, const char* what, double least, double most,
+                                double measured) {
+    PaperCheckResult check;
+    check.name = what;
+    check.subject = "circle, " + row.servo;
+    check.against = "bound";
+    check.least = least;
+    check.most = most;
+    check.measured = measured;
+    check.passed = !(measured < least) && !(measured > most);
+    result.checks.push_back(check);
+  };
+  constexpr double kMany = 1e9;
+  /// Rounding of target and position to counts of 1 um, on two axes.
+  constexpr double kRounding_um = 2.0;
+  for (const ContourRow& row : contour.rows) {
+    const auto missed = static_cast<double>(row.missed_windows);
+    if (row.servo == "no sync") {
+      demand(row, "missed SYNC0 windows", 1.0, kMany, missed);
+      demand(row, "contour error, largest / um", kRounding_um, kMany, row.max_um);
+    } else {
+      demand(row, "missed SYNC0 windows", 0.0, 0.0, missed);
+      demand(row, "contour error, largest / um", 0.0, kRounding_um, row.max_um);
+    }
+  }
+  result.contour = std::move(contour);
+}
+
 std::vector<PaperChoice> table6_choices() {
   return {
       {"cycles per second", "47", "fits all five rows; 20 ms (50) is the natural number"},

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/experiment/contour_experiment.h"
 #include "ftcs/experiment/paper_run.h"
 #include "ftcs/experiment/parallel.h"
 
@@ -78,6 +79,9 @@ struct CycleResult {
   std::vector<PaperCheckResult> checks;
   std::vector<PaperChoice> choices;
   std::vector<CycleTrace> traces;  ///< Fig. 7: the first seed
+  ContourResult contour;           ///< no rows: not run
+  std::vector<ContourRow>
+      live_contour;  ///< the same over a virtual link; nothing is demanded of it
   std::uint64_t seeds = 0;
   bool complete = false;
   [[nodiscard]] bool passed() const noexcept;
@@ -91,6 +95,8 @@ struct CycleResult {
 [[nodiscard]] std::vector<PaperCheckResult> judge_table6(const CycleResult& result);
 /// What the paper leaves open.
 [[nodiscard]] std::vector<PaperChoice> table6_choices();
+/// Takes the circle into the result: what synchronisation must bring, as checks.
+void add_contour(CycleResult& result, ContourResult contour);
 [[nodiscard]] CycleResult run_table6(std::uint64_t seeds, const JobControl& control);
 
 }  // namespace ftcs::experiment

@@ -60,6 +60,64 @@ Plot figure_plot(const CycleResult& result) {
   return plot;
 }
 
+Json contour_json(const std::vector<experiment::ContourRow>& rows) {
+  Json array = Json::array();
+  for (const experiment::ContourRow& row : rows) {
+    array.push_back({{"servo", row.servo},
+                     {"rms_contour_error_um", number(row.rms_um)},
+                     {"max_contour_error_um", number(row.max_um)},
+                     {"missed_sync0_windows", row.missed_windows},
+                     {"sync0_windows", row.windows},
+                     {"first_fault_s", number(row.first_fault_s)},
+                     {"host_stall_cycles", row.host_stalls}});
+  }
+  return array;
+}
+
+Json world_json(const experiment::ContourResult& contour) {
+  const experiment::ContourWorld& world = contour.world;
+  return {{"radius_um", world.radius_um},
+          {"turn_s", world.turn_s},
+          {"reference_ppm", world.reference_ppm},
+          {"other_ppm", world.other_ppm},
+          {"settling_s", world.settling_s},
+          {"measured_s", world.measured_s},
+          {"seed", contour.seed}};
+}
+
+Plot contour_plot(const char* title, const std::vector<experiment::ContourRow>& rows) {
+  constexpr double kCycle_s = 1e-3;
+  Plot plot;
+  plot.title = title;
+  plot.x_label = "s";
+  plot.y_label = "um";
+  for (const experiment::ContourRow& row : rows) {
+    plot.series.push_back(
+        trace_series(row.servo, row.trace_um, experiment::ContourRow::kTraceGroup * kCycle_s, 1.0));
+  }
+  plot.note = "Largest of each 20 cycles.";
+  return plot;
+}
+
+std::string contour_method(const experiment::ContourWorld& world) {
+  return fmt::format(
+      "Two modelled drives draw a circle of {:g} mm radius in {:g} s a turn (counts of 1 um), "
+      "cycle "
+      "1 ms, SYNC0 half a cycle behind the frame, reference {:+g} ppm; {:g} s measured. Contour "
+      "error: distance from the circle that the same position loops draw with no window missed. "
+      "Windows: SYNC0 events of both drives; missed: without new outputs, the drives' own limit "
+      "switched off. First fault: the same run with the limit as drives have it (0x001A). All "
+      "three "
+      "servos keep every window: they differ in how soon they lock and what they must be told, not "
+      "on the circle.",
+      world.radius_um * 1e-3, world.turn_s, world.reference_ppm, world.measured_s);
+}
+
+constexpr const char* kLiveMethod =
+    "The same over a virtual link (UDP on loopback), reference +100 ppm, 12 s each; cycles that "
+    "the "
+    "host stood still miss windows whatever the servo does.";
+
 constexpr const char* kRemark =
     "RMS: of one run of 200 intervals, median over seeds. Perceived: what the servo saw. Event: "
     "the "
@@ -84,10 +142,39 @@ Table cycle_table(const CycleResult& result) {
   return table;
 }
 
+Table contour_table(const std::vector<experiment::ContourRow>& rows) {
+  Table table({"servo", "contour error, RMS / um", "largest / um", "missed SYNC0 windows", "of",
+               "first fault of a drive / s", "host stalls / cycles"});
+  for (const experiment::ContourRow& row : rows) {
+    table.add_row({row.servo, Cell::significant(row.rms_um, 3), Cell::significant(row.max_um, 3),
+                   Cell::count(row.missed_windows), Cell::count(row.windows),
+                   Cell::significant(row.first_fault_s, 3), Cell::count(row.host_stalls)});
+  }
+  return table;
+}
+
+namespace {
+std::string contour_console(const CycleResult& result) {
+  std::string text;
+  if (!result.contour.rows.empty()) {
+    text += fmt::format("\nA circle of two axes\n\n{}{}\n",
+                        contour_table(result.contour.rows).to_text(),
+                        contour_method(result.contour.world));
+  }
+  if (!result.live_contour.empty()) {
+    text += fmt::format("\nA circle of two axes, live\n\n{}{}\n",
+                        contour_table(result.live_contour).to_text(), kLiveMethod);
+  }
+  return text;
+}
+}  // namespace
+
 std::string cycle_console(const CycleResult& result) {
-  return fmt::format(
-      "{}\n{} seeds\n\n{}\n{}\n\n{}\n{}", kTitle, result.seeds, cycle_table(result).to_text(),
-      kRemark, choices_table(result.choices).to_text(), checks_table(result.checks).to_text());
+  return contour_console(result) + "\n" +
+         fmt::format("{}\n{} seeds\n\n{}\n{}\n\n{}\n{}", kTitle, result.seeds,
+                     cycle_table(result).to_text(), kRemark,
+                     choices_table(result.choices).to_text(),
+                     checks_table(result.checks).to_text());
 }
 
 Json cycle_json(const CycleResult& result, const std::string& version) {
@@ -112,7 +199,11 @@ Json cycle_json(const CycleResult& result, const std::string& version) {
               {"checks", std::move(checks)},
               {"choices", std::move(choices)},
               {"support", {{"table6", std::move(support)}}},
-              {"figures", {{"figure7", std::move(traces)}}}};
+              {"figures", {{"figure7", std::move(traces)}}},
+              {"contour",
+               {{"world", world_json(result.contour)},
+                {"rows", contour_json(result.contour.rows)},
+                {"live", contour_json(result.live_contour)}}}};
 }
 
 std::string cycle_html(const CycleResult& result, const std::string& version) {
@@ -121,6 +212,15 @@ std::string cycle_html(const CycleResult& result, const std::string& version) {
   report.add_table(kTitle, cycle_table(result), fmt::format("{} seeds", result.seeds));
   report.add_note(kRemark);
   report.add_plot(figure_plot(result));
+  if (!result.contour.rows.empty()) {
+    report.add_table("A circle of two axes", contour_table(result.contour.rows),
+                     contour_method(result.contour.world));
+    report.add_plot(contour_plot("Contour error of the circle", result.contour.rows));
+  }
+  if (!result.live_contour.empty()) {
+    report.add_table("A circle of two axes, live", contour_table(result.live_contour), kLiveMethod);
+    report.add_plot(contour_plot("Contour error of the circle, live", result.live_contour));
+  }
   report.add_table("Choices", choices_table(result.choices));
   report.add_table("Checks", checks_table(result.checks));
   report.add_parameters({{"version", version}});

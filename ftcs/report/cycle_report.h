@@ -11,8 +11,11 @@ namespace ftcs {
 
 /// Table 6 of the paper beside ours: perceived, event and virtual error of each row.
 [[nodiscard]] Table cycle_table(const experiment::CycleResult& result);
+/// The circle of two axes: contour error and missed SYNC0 windows of each way to keep the cycle.
+[[nodiscard]] Table contour_table(const std::vector<experiment::ContourRow>& rows);
 [[nodiscard]] std::string cycle_console(const experiment::CycleResult& result);
-/// {"version", "passed", "tables": {"table6": [...]}, "checks", "choices", "figures": {"figure7"}}.
+/// {"version", "passed", "tables": {"table6": [...]}, "checks", "choices", "figures": {"figure7"},
+/// "contour": {"world", "rows": [...], "live": [...]}}.
 [[nodiscard]] Json cycle_json(const experiment::CycleResult& result, const std::string& version);
 [[nodiscard]] std::string cycle_html(const experiment::CycleResult& result,
                                      const std::string& version);

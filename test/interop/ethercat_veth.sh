@@ -51,7 +51,10 @@ for servo, lock in (("ftcs", 3 * 500), ("adaptive", 50), ("pics", None), ("soem-
     run = json.load(open(f"{folder}/{servo}.json"))
     phase, wire = run["virtual_phase"], run["wire_phase"]
     if phase is None:
-        print(f"{servo}: no lock, rate {run['rate_ppb'] / 1000:.1f} ppm")
+        phase, wire = run["virtual_phase_second_half"], run["wire_phase_second_half"]
+        print(f"{servo}: no lock (20 cycles within 5 us), rate {run['rate_ppb'] / 1000:.1f} ppm, second half |phase| p50 "
+              f"{phase['p50_ns'] / 1000:.1f} p99 {phase['p99_ns'] / 1000:.1f} us, frame itself p50 {wire['p50_ns'] / 1000:.1f} "
+              f"p99 {wire['p99_ns'] / 1000:.1f} us")
         if lock:
             failed.append(f"{servo}: no lock")
         continue
@@ -69,6 +72,7 @@ for servo, lock in (("ftcs", 3 * 500), ("adaptive", 50), ("pics", None), ("soem-
     # A stall of the host in the first cycles delays the lock; it is counted.
     if run["lock_cycle"] > lock + run["late"] + run["slow"] + run["lost_frames"]:
         failed.append(f"{servo}: lock time")
+    # A frame that came back too late, or not at all while the host stood still, is counted apart.
     if run["working_counter_right"] + run["lost_frames"] < run["cycles"]:
         failed.append(f"{servo}: working counter")
     if run["system_time_difference_bound_ns"] >= 128:  # magnitudes below 100 OR-ed

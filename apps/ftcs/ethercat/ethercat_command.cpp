@@ -129,7 +129,6 @@ int run_main(EthercatArguments arguments) {
     fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
     return kUsageError;
   }
-  arguments.options.trace = !arguments.options.html.empty();
   const RunOptions& options = arguments.options;
   auto link = open_link(options);
   if (!link) {

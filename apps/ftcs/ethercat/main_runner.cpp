@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "ftcs/ethercat/maindevice/csp_profile.h"
+#include "ftcs/ethercat/subdevice/drive_motor.h"
 
 namespace ftcs::app {
 
@@ -24,9 +25,6 @@ constexpr double kReplyShare = 0.8;
 constexpr std::uint64_t kCyclesBetweenRequests = 1000;
 /// Live lines on the terminal.
 constexpr Nanoseconds kLineInterval{1'000'000'000};
-/// Circle of the demonstration: counts, and seconds for one turn.
-constexpr double kRadius = 10'000.0;
-constexpr double kTurn_s = 2.0;
 
 float microseconds(double ns) { return static_cast<float>(ns * 1e-3); }
 
@@ -51,7 +49,7 @@ ethercat::MainDeviceConfig make_config(const RunOptions& options, bool scan_only
 }  // namespace
 
 MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
-    : options_(options), link_(std::move(link)), path_(kRadius, kTurn_s) {
+    : options_(options), link_(std::move(link)), path_(options.radius, options.turn_s) {
   const auto objects = ethercat::csp_objects(options.servo.cycle);
   objects_.assign(objects.begin(), objects.end());
   objects_.push_back({{0x10F1, 2}, 2, options.sync_error_limit, false});
@@ -107,6 +105,8 @@ bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
 void MainRunner::reserve_trace() {
   constexpr std::size_t kMostEvents = 1000;
   figures_.events.reserve(kMostEvents);
+  constexpr std::size_t kMostGroups = 50'000;
+  if (options_.contour) figures_.contour_trace.reserve(kMostGroups);
   constexpr double kMostPoints = 500'000.0;
   const double cycle_s = static_cast<double>(options_.servo.cycle.count()) * 1e-9;
   const double cycles = options_.duration_s / cycle_s + 1000.0;
@@ -155,6 +155,7 @@ void MainRunner::cycle() {
   note(sample, answered);
   watch_lock();
   watch_drives();
+  if (options_.contour) watch_contour();
   supervise();
   if (csv_) write_csv(sample);
   if (HostClock::now() >= next_line_) {
@@ -171,7 +172,7 @@ void MainRunner::move_axes() {
   const bool all_enabled = std::all_of(
       axes_.begin(), axes_.end(),
       [](const ethercat::CspAxis& axis) { return axis.state() == ethercat::AxisState::kEnabled; });
-  path_.advance(moving && all_enabled);
+  path_.advance(moving && all_enabled, time);
   for (std::size_t n = 0; n < axes_.size(); ++n) {
     const auto outputs = main_->outputs(n);
     const auto inputs = main_->inputs(n);
@@ -183,7 +184,7 @@ void MainRunner::move_axes() {
         .cycle(ethercat::csp::Inputs::decode(inputs),
                {.enable = moving && (enabled || path_.at_rest()),
                 .reset_fault = figures_.cycles % 2 == 0,
-                .displacement = path_.displacement(n, time)})
+                .displacement = path_.displacement(n)})
         .encode(outputs);
   }
 }
@@ -237,7 +238,8 @@ void MainRunner::trace(const CycleSample& sample) {
   if (figures_.trace.size() == figures_.trace.capacity()) return;
   figures_.trace.push_back({static_cast<float>(time_s), microseconds(decision_.phase_error.ns()),
                             microseconds(wire_ns), microseconds(decision_.lateness.ns()),
-                            microseconds(static_cast<double>(margin_ns(sample)))});
+                            microseconds(static_cast<double>(margin_ns(sample))),
+                            microseconds((sample.received - sample.sent).ns())});
 }
 
 /// OP once the cycle is locked; a SubDevice that left it is acknowledged and asked again.
@@ -302,13 +304,35 @@ void MainRunner::watch_drives() {
   }
 }
 
+/// Both positions are of one SYNC0. From the full radius on.
+void MainRunner::watch_contour() {
+  if (!path_.at_full() || axes_.size() < 2 || !main_->last_cycle().inputs_valid) return;
+  const double cycle_s = static_cast<double>(options_.servo.cycle.count()) * 1e-9;
+  const double radius = options_.radius * ethercat::DriveMotor::steady_gain(
+                                              2.0 * std::numbers::pi * cycle_s / options_.turn_s);
+  const auto at = [this](std::size_t n) {
+    const std::int32_t position = ethercat::csp::Inputs::decode(main_->inputs(n)).position;
+    return static_cast<double>(position - axes_[n].origin());
+  };
+  const double error = std::hypot(at(0), at(1)) - radius;
+  figures_.contour.add(error);
+  constexpr std::uint64_t kGroup = 20;
+  contour_group_ = std::max(contour_group_, std::abs(error));
+  if (figures_.contour.count() % kGroup != 0) return;
+  if (figures_.contour_trace.size() < figures_.contour_trace.capacity()) {
+    figures_.contour_trace.push_back(contour_group_);
+  }
+  contour_group_ = 0.0;
+}
+
 void MainRunner::print_live() const {
   const ethercat::CycleReport& report = main_->last_cycle();
   const double rate = decision_.rate.ratio();
   fmt::print(
-      "margin {:7.1f} us  {:9}  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle {:.6f} ms  "
+      "margin {:7.1f} us  {:9} (first after {})  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle "
+      "{:.6f} ms  "
       "wkc {}/{}  al 0x{:02X}  |0x092C| < {} ns  lost {}  late {}\n",
-      figures_.margin.quantile(0.5) * 1e-3, name(decision_.state),
+      figures_.margin.quantile(0.5) * 1e-3, name(decision_.state), figures_.lock_cycle,
       decision_.phase_error.ns() * 1e-3, decision_.rate.ppm(),
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
       report.expected, report.states, report.difference_bound_ns + 1, main_->counters().lost,

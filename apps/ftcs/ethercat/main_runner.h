@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ftcs/analysis/quantile_sketch.h"
+#include "ftcs/analysis/statistics.h"
 #include "ftcs/discipline/cycle_servo.h"
 #include "ftcs/ethercat/maindevice/circle_path.h"
 #include "ftcs/ethercat/maindevice/csp_axis.h"
@@ -36,9 +37,12 @@ struct RunOptions {
   std::uint32_t sync_error_limit = 17;
   /// So long fewer drives than scanned may answer before the rest is stopped.
   double ride_through_s = 0.0;
-  bool move = true;  ///< the axes draw circles, two by two
+  bool move = true;          ///< the axes draw circles, two by two
+  double radius = 10'000.0;  ///< counts
+  double turn_s = 2.0;
+  bool contour = false;  ///< drives are the modelled ones: watch the circle of the first two
   bool quiet = false;
-  bool trace = false;  ///< keep a point for each cycle: plots
+  bool trace = true;  ///< keep a point for each of the first half million cycles: histograms, plots
   std::string json;
   std::string csv;
   std::string html;
@@ -51,6 +55,7 @@ struct RunPoint {
   float wire_us = 0.0F;
   float lateness_us = 0.0F;
   float margin_us = 0.0F;
+  float round_trip_us = 0.0F;
 };
 
 /// Something that happened while the drives ran.
@@ -90,7 +95,9 @@ struct RunFigures {
   QuantileSketch round_trip;
   QuantileSketch margin;  ///< SYNC0 minus arrival
   std::vector<RunPoint> trace;
-  std::vector<RunEvent> events;  ///< the first thousand
+  RunningStatistics contour;          ///< counts, off the circle that the drives' loops draw
+  std::vector<double> contour_trace;  ///< largest of each 20 cycles
+  std::vector<RunEvent> events;       ///< the first thousand
 };
 
 /// Drives a MainDevice and a cycle servo over a link: bring-up, cyclic exchange, motion, report.
@@ -120,6 +127,7 @@ class MainRunner {
   void supervise();
   void watch_lock();
   void watch_drives();
+  void watch_contour();
   void record(RunEvent::Kind kind, std::size_t drive = RunEvent::kNobody,
               ethercat::AlStatusCode code = ethercat::AlStatusCode::kNoError);
   void print_live() const;
@@ -140,6 +148,7 @@ class MainRunner {
   std::uint64_t lost_lock_at_ = 0;
   std::uint32_t reintegrated_ = 0;
   std::size_t reintegrating_ = 0;
+  double contour_group_ = 0.0;
   CycleDecision decision_;
   RunFigures figures_;
   FreeRunningTime start_;

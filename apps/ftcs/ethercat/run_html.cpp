@@ -5,16 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "apps/ftcs/ethercat/run_histograms.h"
 #include "apps/ftcs/live_view.h"
-#include "ftcs/analysis/statistics.h"
 
 namespace ftcs::app {
 
 namespace {
-
-constexpr std::size_t kBins = 80;
-/// Histograms show what lies inside these quantiles: one stall would squeeze the rest into one bin.
-constexpr double kShownQuantile = 0.999;
 
 PlotSeries over_time(const MainRunner& run, float RunPoint::*field) {
   PlotSeries series;
@@ -36,19 +32,14 @@ Plot time_plot(std::span<const MainRunner* const> runs, const char* title, const
   return plot;
 }
 
-Plot histogram_plot(const MainRunner& run, const char* title, const QuantileSketch& sketch,
-                    float RunPoint::*field) {
+Plot histogram_plot(const MainRunner& run, const char* title, float RunPoint::*field) {
   Plot plot;
   plot.title = fmt::format("{}, {}", title, run.options().servo_name);
   plot.x_label = "us";
   plot.y_label = "cycles";
   plot.style = PlotStyle::kFilledSteps;
-  const double lower = sketch.quantile(1.0 - kShownQuantile) * 1e-3;
-  const double upper = sketch.quantile(kShownQuantile) * 1e-3;
-  std::vector<double> values;
-  for (const RunPoint& point : run.figures().trace) values.push_back(point.*field);
-  if (!(lower < upper)) return plot;
-  const Histogram bins = histogram(values, lower, upper, kBins);
+  const Histogram bins = run_histogram(run.figures(), field);
+  if (bins.counts.empty()) return plot;
   plot.series.push_back(histogram_series("cycles", bins, 1.0));
   plot.note = fmt::format("{} cycles lie outside.", bins.below + bins.above);
   return plot;
@@ -102,12 +93,10 @@ void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> run
       time_plot(runs, "Phase error of the cycle, early is positive", "us", &RunPoint::phase_us));
   if (runs.empty()) return;
   const MainRunner& first = *runs.front();
-  report.add_plot(histogram_plot(first, "Margin from the frame to SYNC0", first.figures().margin,
-                                 &RunPoint::margin_us));
-  report.add_plot(histogram_plot(first, "Lateness of the wake-up", first.figures().lateness,
-                                 &RunPoint::lateness_us));
-  report.add_plot(histogram_plot(first, "Phase error of the cycle", first.figures().phase,
-                                 &RunPoint::phase_us));
+  report.add_plot(histogram_plot(first, "Margin from the frame to SYNC0", &RunPoint::margin_us));
+  report.add_plot(histogram_plot(first, "Lateness of the wake-up", &RunPoint::lateness_us));
+  report.add_plot(histogram_plot(first, "Phase error of the cycle", &RunPoint::phase_us));
+  report.add_plot(histogram_plot(first, "Round trip of the frame", &RunPoint::round_trip_us));
 }
 
 Table drives_table(const SegmentServer& server) {

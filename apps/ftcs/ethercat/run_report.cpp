@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/ethercat/main_runner.h"
+#include "apps/ftcs/ethercat/run_histograms.h"
 
 namespace ftcs::app {
 
@@ -41,6 +42,34 @@ Json drives_json(const MainRunner& runner) {
                           {"propagation_delay_ns", device.propagation_delay}});
   }
   return drives;
+}
+
+constexpr std::pair<const char*, float RunPoint::*> kHistograms[] = {
+    {"margin", &RunPoint::margin_us},
+    {"phase", &RunPoint::phase_us},
+    {"lateness", &RunPoint::lateness_us},
+    {"round_trip", &RunPoint::round_trip_us}};
+
+Json histograms_json(const RunFigures& figures) {
+  Json result = Json::object();
+  for (const auto& [name, field] : kHistograms) {
+    const Histogram bins = run_histogram(figures, field);
+    if (bins.counts.empty()) continue;
+    result[name] = {{"lower_us", bins.lower},
+                    {"upper_us", bins.upper},
+                    {"counts", bins.counts},
+                    {"outside", bins.below + bins.above}};
+  }
+  return result;
+}
+
+void print_histograms(const RunFigures& figures) {
+  for (const auto& [name, field] : kHistograms) {
+    const Histogram bins = run_histogram(figures, field);
+    if (bins.counts.empty()) continue;
+    fmt::print("{:<10} {:9.3f} |{}| {:9.3f} us, {} outside\n", name, bins.lower,
+               histogram_bars(bins), bins.upper, bins.below + bins.above);
+  }
 }
 
 Json events_json(const RunFigures& figures) {
@@ -192,6 +221,7 @@ void print_run(const MainRunner& runner) {
   print_quantiles("lateness", figures.lateness, false);
   print_quantiles("round trip", figures.round_trip, false);
   print_quantiles("margin to SYNC0", figures.margin, false);
+  print_histograms(figures);
   fmt::print("|0x092C| from one second after the lock: under {} ns (bound)\n",
              figures.worst_difference_ns + 1);
   fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}\n", runner.decision().rate.ppm(),
@@ -237,6 +267,7 @@ Json run_json(const MainRunner& runner) {
             {"impossible", servo.impossible},
             {"resyncs", servo.resyncs},
             {"reintegrated", runner.main().counters().reintegrated},
+            {"histograms", histograms_json(figures)},
             {"events", events_json(figures)},
             {"drives", drives_json(runner)}};
   if (runner.main().failure()) json["failure"] = describe(runner.main().failure());

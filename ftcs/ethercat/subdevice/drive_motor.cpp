@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/ethercat/subdevice/drive_motor.h"
 
+#include <cmath>
+
 namespace ftcs::ethercat {
 
 namespace {
@@ -19,6 +21,11 @@ bool shutdown(unsigned word) noexcept { return (word & 0x07U) == 0x06; }
 bool switch_on(unsigned word) noexcept { return (word & 0x07U) == 0x07; }
 bool enable_operation(unsigned word) noexcept { return (word & 0x0FU) == 0x0F; }
 }  // namespace
+
+double DriveMotor::steady_gain(double radians) noexcept {
+  constexpr double kRest = 1.0 - kLoopGain;
+  return kLoopGain / std::sqrt(1.0 - 2.0 * kRest * std::cos(radians) + kRest * kRest);
+}
 
 void DriveMotor::control(std::uint16_t controlword, bool operational) noexcept {
   using enum DriveState;

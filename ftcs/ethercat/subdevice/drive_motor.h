@@ -21,6 +21,9 @@ enum class DriveState : std::uint8_t {
 /// position loop closes a fixed share of the error:  x(n+1) = x(n) + kLoopGain (target(n) - x(n)).
 class DriveMotor {
  public:
+  /// |H| of the position loop at so many radians per sample: the radius of a circle that it draws,
+  /// over the one it is told.  H(z) = g / (z - 1 + g).
+  [[nodiscard]] static double steady_gain(double radians) noexcept;
   void reset() noexcept { *this = DriveMotor{}; }
   /// A new controlword; transitions happen only while `operational` (outputs are valid).
   void control(std::uint16_t controlword, bool operational) noexcept;

@@ -38,6 +38,7 @@ class MainBench : public WireBench {
       main_->on_timeout();
       return false;
     }
+    if (tamper) tamper(*view);
     if (capture) capture(now_of_master(), ConstBytes{buffer}.first(frame.size()));
     const FrameStamps stamps{now_of_master(), LocalTime{passage.at.since_epoch()}};
     main_->on_frame(Bytes{buffer}.first(frame.size()), stamps);
@@ -61,6 +62,7 @@ class MainBench : public WireBench {
 
   std::function<bool(std::size_t)> lose;
   std::function<void(LocalTime, ConstBytes)> capture;
+  std::function<void(const FrameView&)> tamper;  ///< changes what comes back
 
  private:
   std::unique_ptr<MainDevice> main_;

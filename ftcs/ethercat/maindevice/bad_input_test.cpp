@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// The world: a MainDevice and three modelled drives in simulated time, and a wire that changes what
+// comes back. Whatever it is, the bring-up ends with one failure that names it, or goes on.
+#include <gtest/gtest.h>
+
+#include "ftcs/ethercat/test/main_bench.h"
+
+namespace ftcs::ethercat {
+namespace {
+
+class BadInput : public ::testing::Test {
+ protected:
+  BadInput() { bench_.add_line(3, Nanoseconds{50}); }
+  const Failure& bring_up() {
+    bench_.bring_up();
+    return bench_.main().failure();
+  }
+  /// Every answer to a read of this register.
+  void change(std::uint16_t offset, const std::function<void(const Datagram&)>& what) {
+    bench_.tamper = [offset, what](const FrameView& frame) {
+      for (const Datagram datagram : frame) {
+        const bool read =
+            datagram.command() == Command::kFprd || datagram.command() == Command::kBrd;
+        if (read && datagram.offset() == offset) what(datagram);
+      }
+    };
+  }
+  static void set_counter(const Datagram& datagram, unsigned counter) {
+    datagram.add_to_working_counter(counter - datagram.working_counter());
+  }
+  test::MainBench bench_{MainDeviceConfig{.clocks = {.drift_pulses = 10}}};
+};
+
+TEST_F(BadInput, without_any_the_bring_up_succeeds) {
+  EXPECT_FALSE(bring_up()) << name(bench_.main().failure().kind);
+}
+
+TEST_F(BadInput, a_wire_that_only_reflects_has_no_subdevices) {
+  MainDevice main{{}};
+  const ConstBytes frame = main.next_frame();
+  std::vector<std::uint8_t> reflected(frame.begin(), frame.end());
+  EXPECT_EQ(main.on_frame(reflected, {}), FrameOutcome::kStopped);
+  EXPECT_EQ(main.failure().kind, FailureKind::kNoSubDevices);
+}
+
+TEST_F(BadInput, more_subdevices_than_there_is_memory_for) {
+  change(reg::kType, [](const Datagram& datagram) {
+    if (datagram.command() == Command::kBrd) set_counter(datagram, kMaxSubDevices + 1);
+  });
+  EXPECT_EQ(bring_up().kind, FailureKind::kTooManySubDevices);
+  EXPECT_EQ(bring_up().received, kMaxSubDevices + 1);
+  EXPECT_EQ(bring_up().expected, kMaxSubDevices);
+}
+
+TEST_F(BadInput, one_that_was_counted_and_does_not_answer) {
+  change(reg::kType, [](const Datagram& datagram) {
+    if (datagram.command() == Command::kFprd && datagram.position() == kFirstStation + 1) {
+      set_counter(datagram, 0);
+    }
+  });
+  EXPECT_EQ(bring_up().kind, FailureKind::kNotAnswering);
+  EXPECT_EQ(bring_up().position, 1);
+}
+
+TEST_F(BadInput, an_sii_whose_checksum_is_wrong) {
+  change(reg::kSiiControl, [](const Datagram& datagram) {
+    const Bytes data = datagram.data();
+    const bool first_words = data.size() > 6 && load<std::uint32_t>(data, 2) == 0;
+    if (first_words) data[6] ^= 0x01;
+  });
+  EXPECT_EQ(bring_up().kind, FailureKind::kBadSii);
+  EXPECT_EQ(bring_up().position, 0);
+}
+
+TEST_F(BadInput, an_sii_that_never_ends_is_an_error_and_no_endless_reading) {
+  // Each category claims to be one word long and to be followed by another.
+  change(reg::kSiiControl, [](const Datagram& datagram) {
+    const Bytes data = datagram.data();
+    const std::uint32_t word = data.size() > 6 ? load<std::uint32_t>(data, 2) : 0;
+    if (word < sii::kCategoriesWord) return;
+    for (std::size_t at = 6; at < data.size(); ++at) data[at] = 0x01;
+  });
+  const Failure& failure = bring_up();
+  EXPECT_EQ(failure.kind, FailureKind::kBadSii) << name(failure.kind);
+}
+
+TEST_F(BadInput, an_sii_interface_that_stays_busy) {
+  change(reg::kSiiControl,
+         [](const Datagram& datagram) { store(datagram.data(), 0, std::uint16_t{0x8000}); });
+  EXPECT_EQ(bring_up().kind, FailureKind::kSiiTimeout);
+}
+
+TEST_F(BadInput, ports_that_do_not_form_a_tree) {
+  change(reg::kDlStatus,
+         [](const Datagram& datagram) { store(datagram.data(), 0, std::uint16_t{0xFFFF}); });
+  EXPECT_EQ(bring_up().kind, FailureKind::kImpossibleTopology);
+}
+
+TEST_F(BadInput, a_subdevice_that_does_not_come_down_to_init) {
+  change(reg::kAlStatus, [](const Datagram& datagram) {
+    if (datagram.data().size() >= 6) store(datagram.data(), 0, std::uint16_t{0x12});
+  });
+  const Failure& failure = bring_up();
+  EXPECT_EQ(failure.kind, FailureKind::kStateTimeout);
+  EXPECT_EQ(failure.wanted, AlState::kInit);
+}
+
+TEST_F(BadInput, foreign_and_malformed_frames_between_the_answers_are_counted_and_passed_over) {
+  std::uint64_t sent = 0;
+  bench_.tamper = [this, &sent](const FrameView&) {
+    std::array<std::uint8_t, 60> rubbish{};
+    rubbish.fill(static_cast<std::uint8_t>(sent++));
+    EXPECT_EQ(bench_.main().on_frame(rubbish, {}), FrameOutcome::kIgnored);
+  };
+  EXPECT_FALSE(bring_up()) << name(bench_.main().failure().kind);
+  EXPECT_EQ(bench_.main().counters().ignored, sent);
+}
+
+}  // namespace
+}  // namespace ftcs::ethercat
