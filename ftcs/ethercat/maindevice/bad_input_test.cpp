@@ -10,7 +10,12 @@ namespace {
 
 class BadInput : public ::testing::Test {
  protected:
-  BadInput() { bench_.add_line(3, Nanoseconds{50}); }
+  BadInput() {
+    MainDeviceConfig config;
+    config.clocks.drift_pulses = 10;
+    bench_.configure(config);
+    bench_.add_line(3, Nanoseconds{50});
+  }
   const Failure& bring_up() {
     bench_.bring_up();
     return bench_.main().failure();
@@ -28,7 +33,7 @@ class BadInput : public ::testing::Test {
   static void set_counter(const Datagram& datagram, unsigned counter) {
     datagram.add_to_working_counter(counter - datagram.working_counter());
   }
-  test::MainBench bench_{MainDeviceConfig{.clocks = {.drift_pulses = 10}}};
+  test::MainBench bench_;
 };
 
 TEST_F(BadInput, without_any_the_bring_up_succeeds) {
