@@ -59,6 +59,7 @@ std::string_view to_string(Counter counter) noexcept {
       "lost_pdelay_resp",
       "lost_pdelay_resp_follow_up",
       "stale_pdelay_resp",
+      "duplicate_pdelay_req",
       "wrong_peer",
       "several_responders",
       "absurd_peer_delay",

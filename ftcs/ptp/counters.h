@@ -78,6 +78,7 @@ enum class Counter : std::uint8_t {
   kLostPdelayResp,          ///< a request that was never answered: forgotten
   kLostPdelayRespFollowUp,  ///< a two-step answer whose Follow_Up did not come: forgotten
   kStalePdelayResp,         ///< an answer to no open request (late, duplicate or forged): dropped
+  kDuplicatePdelayReq,      ///< second copy of a request: answered once
   kWrongPeer,               ///< a Pdelay_Resp_Follow_Up of another port than the answer: dropped
   kSeveralResponders,       ///< two ports answer one request: what is there is no link between two
                             ///< ports.

@@ -38,9 +38,13 @@ struct Network {
 
 class World {
  public:
-  World(const Network& network, std::uint64_t seed, std::int8_t log_interval)
+  World(const Network& network, std::uint64_t seed, std::int8_t log_interval,
+        DelayMechanism mechanism = DelayMechanism::kEndToEnd)
       : network_(network), random_(seed) {
     TimeReceiverConfig receiver;
+    receiver.delay_mechanism = transmitter_config_.delay_mechanism = mechanism;
+    receiver.peer_delay.log_min_interval = transmitter_config_.peer_delay.log_min_interval =
+        log_interval;
     receiver.port = kReceiverPort;
     receiver.log_min_delay_req_interval = log_interval;
     receiver.seed = seed;
@@ -77,6 +81,7 @@ class World {
   [[nodiscard]] const Counters& transmitter_counters() const { return transmitter_->counters(); }
   [[nodiscard]] std::size_t forward_pairs() const { return forward_pairs_; }
   [[nodiscard]] std::size_t backward_pairs() const { return backward_pairs_; }
+  [[nodiscard]] std::size_t peer_delays() const { return peer_delays_; }
 
  private:
   struct Event {
@@ -145,6 +150,7 @@ class World {
 
   void perform_transmitter(const ActionList& actions) {
     for (const Action& action : actions) {
+      if (const auto* delay = std::get_if<EmitPeerDelay>(&action)) check(*delay);
       const auto* send = std::get_if<SendMessage>(&action);
       if (send == nullptr) continue;
       const auto message = *send;
@@ -172,24 +178,27 @@ class World {
 
   void perform(const ActionList& actions) {
     for (const Action& action : actions) {
-      if (const auto* send = std::get_if<SendMessage>(&action)) send_request(*send);
+      if (const auto* send = std::get_if<SendMessage>(&action)) send_from_receiver(*send);
+      if (const auto* delay = std::get_if<EmitPeerDelay>(&action)) check(*delay);
       if (const auto* emit = std::get_if<EmitPair>(&action)) check(emit->pair);
       EXPECT_FALSE(std::holds_alternative<ReferenceJumped>(action))
           << "the reference never jumps here";
     }
   }
 
-  void send_request(const SendMessage message) {
+  void send_from_receiver(const SendMessage message) {
     const FreeRunningTime sent = local();
+    const bool event = message.channel == Channel::kEvent;
     for (const auto time : arrivals()) {
-      request_book_.insert({sent, reference(time)});
-      at(time, [this, message] {
-        if (transmitter_) {
-          perform_transmitter(
-              transmitter_->on_event_message(message.bytes.view(), reference(now_), raw()));
-        }
+      if (event) request_book_.insert({sent, reference(time)});
+      at(time, [this, message, event] {
+        if (!transmitter_) return;
+        const auto bytes = message.bytes.view();
+        perform_transmitter(event ? transmitter_->on_event_message(bytes, reference(now_), raw())
+                                  : transmitter_->on_general_message(bytes, raw()));
       });
     }
+    if (!event) return;
     const bool missing = chance() < network_.missing_stamps;
     at(now_ + uniform(network_.stamp_delay), [this, message, sent, missing] {
       perform(missing ? receiver_->on_transmit_timestamp_missing(message.id(), local())
@@ -213,6 +222,21 @@ class World {
     }
   }
 
+  /// With stamps of one exchange the delay lies between that of the fastest message and that of the
+  /// slowest, and what 300 ppm make of the turn-around; with stamps of two it is off by parts of a
+  /// second.
+  void check(const EmitPeerDelay& delay) {
+    ++peer_delays_;
+    const double turn_around_ns = 2.0 * static_cast<double>(network_.stamp_delay.count());
+    const double rate_error_ns =
+        (turn_around_ns + static_cast<double>(network_.jitter.count())) * 1e-3;
+    const double least = static_cast<double>(network_.minimum_delay.count());
+    ASSERT_GT(delay.mean_link_delay.ns(), least - rate_error_ns - 100.0) << "a wrong peer delay";
+    ASSERT_LT(delay.mean_link_delay.ns(),
+              least + static_cast<double>(network_.jitter.count()) + rate_error_ns + 100.0)
+        << "a wrong peer delay";
+  }
+
   static constexpr std::int64_t kEpoch = 1'800'000'000'000'000'000;
 
   Network network_;
@@ -232,6 +256,7 @@ class World {
   FreeRunningTime last_request_;
   std::size_t forward_pairs_ = 0;
   std::size_t backward_pairs_ = 0;
+  std::size_t peer_delays_ = 0;  ///< of both ends
 };
 
 TEST(Exchange, a_quiet_network_gives_a_pair_for_every_message) {
@@ -280,6 +305,51 @@ TEST(Exchange, no_mishap_of_the_network_makes_a_wrong_pair) {
     world.run_until(45s);
     EXPECT_GT(world.forward_pairs(), 3U);
     EXPECT_GT(world.backward_pairs(), 3U);
+    EXPECT_EQ(world.receiver().counters()[Counter::kActionsDropped], 0U);
+    if (testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(Exchange, peer_to_peer_both_ends_measure_the_link) {
+  World world({}, 1, -3, DelayMechanism::kPeerToPeer);
+  world.run_until(30s);
+  EXPECT_NEAR(static_cast<double>(world.forward_pairs()), 30.0 * 8.0, 5.0);
+  EXPECT_EQ(world.backward_pairs(), 0U);
+  EXPECT_NEAR(static_cast<double>(world.peer_delays()), 2.0 * 30.0 * 8.0, 10.0);
+  EXPECT_NEAR(world.receiver().peer_delay().mean_link_delay()->ns(), 10'000.0, 1.0);
+  EXPECT_NEAR(world.receiver().peer_delay().neighbor_rate_ratio().inverse().ppm(), 300.0, 0.1);
+  for (const auto counter :
+       {Counter::kLostPdelayResp, Counter::kStalePdelayResp, Counter::kMissingTransmitStamp,
+        Counter::kPdelayIgnored, Counter::kActionsDropped}) {
+    EXPECT_EQ(world.receiver().counters()[counter], 0U) << to_string(counter);
+    EXPECT_EQ(world.transmitter_counters()[counter], 0U) << to_string(counter);
+  }
+}
+
+TEST(Exchange, no_mishap_of_the_network_makes_a_wrong_peer_delay) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<> unit;
+    Network network;
+    network.loss = 0.3 * unit(random);
+    network.duplication = 0.3 * unit(random);
+    network.missing_stamps = 0.2 * unit(random);
+    network.jitter = Nanoseconds{static_cast<std::int64_t>(1e7 * unit(random) * unit(random))};
+    network.stamp_delay = Nanoseconds{static_cast<std::int64_t>(1e8 * unit(random) * unit(random))};
+    const auto log_interval = static_cast<std::int8_t>(-static_cast<int>(seed % 4));
+    World world(network, seed, log_interval, DelayMechanism::kPeerToPeer);
+    world.run_until(15s);
+    world.stop_transmitter();
+    world.run_until(17s);
+    world.start_transmitter();
+    world.run_until(30s);
+    world.link_down();
+    world.run_until(31s);
+    world.link_up();
+    world.run_until(45s);
+    EXPECT_GT(world.forward_pairs(), 3U);
+    EXPECT_GT(world.peer_delays(), 10U);
     EXPECT_EQ(world.receiver().counters()[Counter::kActionsDropped], 0U);
     if (testing::Test::HasFailure()) return;
   }

@@ -107,6 +107,10 @@ bool PeerDelay::usable_correction(const Header& header, Port& port) const noexce
 /// cannot hold of t2 is taken off the correction.
 void PeerDelay::on_request(const Header& header, FreeRunningTime received, Port& port,
                            ActionList& actions) noexcept {
+  const EventId id{MessageType::kPdelayResp, header.sequence_id, header.source};
+  if (std::ranges::any_of(answers_, [&](const Answer& a) { return a.known && a.id == id; })) {
+    return port.count(Counter::kDuplicatePdelayReq);
+  }
   port.count(Counter::kPdelayReqReceived);
   Message message{port.header(header.sequence_id, kNoLogInterval),
                   PdelayResp{on_wire(received), header.source}};
@@ -115,8 +119,7 @@ void PeerDelay::on_request(const Header& header, FreeRunningTime received, Port&
   Answer& answer = answers_[next_answer_];
   next_answer_ = (next_answer_ + 1) % kOpenAnswers;
   if (answer.open) port.count(Counter::kMissingTransmitStamp);
-  answer = Answer{true, EventId{MessageType::kPdelayResp, header.sequence_id, header.source},
-                  header.correction};
+  answer = Answer{true, true, id, header.correction};
   port.send(message, Destination::kNeighbour, Counter::kPdelayRespSent, actions);
 }
 
@@ -140,7 +143,15 @@ void PeerDelay::on_response(const Header& header, const PdelayResp& response,
   Exchange* const exchange = asked(header.sequence_id, response.requesting_port, port);
   if (exchange == nullptr) return;
   if (exchange->answered) {
-    if (header.source == exchange->responder) return port.count(Counter::kStalePdelayResp);
+    if (header.source == exchange->responder) {
+      // Two answers with different stamps, to two copies of the request: which of them the
+      // Follow_Up belongs to, nobody can tell.
+      if (response.request_receipt != exchange->request_receipt ||
+          header.correction != exchange->correction) {
+        exchange->open = false;
+      }
+      return port.count(Counter::kStalePdelayResp);
+    }
     port.count(Counter::kSeveralResponders);
     exchange->several = true;
     exchange->open = false;
@@ -190,7 +201,7 @@ void PeerDelay::on_sent(const EventId& id, FreeRunningTime sent, Port& port,
   Message message{port.header(id.sequence_id, kNoLogInterval),
                   PdelayRespFollowUp{on_wire(sent), id.requester}};
   message.header.correction = answer->correction + fraction_of(on_wire(sent));
-  *answer = Answer{};
+  answer->open = false;
   port.send(message, Destination::kNeighbour, Counter::kPdelayRespFollowUpSent, actions);
 }
 
@@ -205,7 +216,7 @@ void PeerDelay::on_stamp_missing(const EventId& id, Port& port) noexcept {
   Answer* const answer = find_answer(id);
   port.count(answer == nullptr ? Counter::kUnexpectedTransmitStamp
                                : Counter::kMissingTransmitStamp);
-  if (answer != nullptr) *answer = Answer{};
+  if (answer != nullptr) answer->open = false;
 }
 
 PeerDelay::Answer* PeerDelay::find_answer(const EventId& id) noexcept {

@@ -86,9 +86,11 @@ class PeerDelay {
     Duration correction{};            ///< of the answer
     Duration follow_up_correction{};  ///< of its Follow_Up
   };
-  /// An answer of ours whose transmit stamp is awaited.
+  /// An answer of ours. It is remembered for a while after its transmit stamp has come, so that a
+  /// copy of the request is not answered with other stamps.
   struct Answer {
-    bool open = false;
+    bool known = false;
+    bool open = false;  ///< the stamp is awaited
     EventId id{};
     Duration correction{};  ///< of the request
   };

@@ -311,6 +311,23 @@ TEST_F(PeerDelayTest, two_neighbours_with_one_sequence_id_are_kept_apart) {
   EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
 }
 
+TEST_F(PeerDelayTest, a_copy_of_a_request_is_answered_once) {
+  EXPECT_EQ(of<SendMessage>(hand_over(message(5, PdelayReq{}), 1s)).size(), 1U);
+  EXPECT_TRUE(hand_over(message(5, PdelayReq{}), 1s + 3ms).empty());
+  EXPECT_EQ(count(Counter::kDuplicatePdelayReq), 1U);
+  EXPECT_EQ(of<SendMessage>(hand_over(message(6, PdelayReq{}), 2s)).size(), 1U);
+}
+
+TEST_F(PeerDelayTest, of_two_answers_with_different_stamps_none_counts) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  static_cast<void>(hand_over(response(id, kLink), 1ms));
+  static_cast<void>(hand_over(response(id, kLink), 2ms));  // a copy does no harm
+  static_cast<void>(hand_over(response(id, kLink + 3ms), 4ms));
+  EXPECT_TRUE(hand_over(follow_up(id, kLink + 3ms), 4ms).empty());
+  EXPECT_EQ(count(Counter::kStalePdelayResp), 3U);
+}
+
 TEST_F(PeerDelayTest, a_port_that_measures_end_to_end_answers_nothing) {
   peer_.stop();
   EXPECT_TRUE(hand_over(message(1, PdelayReq{}), 1s).empty());

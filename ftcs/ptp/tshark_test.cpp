@@ -170,5 +170,55 @@ TEST_F(Tshark, finds_no_type_malformed) {
             (std::vector<std::string>{"0x02|", "0x03|", "0x0a|", "0x0c|"}));
 }
 
+/// What a gPTP transmitter and a peer-to-peer receiver tell each other.
+std::vector<MessageBytes> peer_conversation() {
+  TimeTransmitterConfig transmitter_config;
+  transmitter_config.port = kTransmitterPort;
+  transmitter_config.major_sdo_id = 1;
+  transmitter_config.delay_mechanism = DelayMechanism::kPeerToPeer;
+  transmitter_config.follow_up_info = true;
+  transmitter_config.path_trace = true;
+  TimeReceiverConfig receiver_config;
+  receiver_config.port = kReceiverPort;
+  receiver_config.major_sdo_id = 1;
+  receiver_config.delay_mechanism = DelayMechanism::kPeerToPeer;
+  TimeTransmitter transmitter(transmitter_config);
+  TimeReceiver receiver(receiver_config);
+  std::vector<MessageBytes> all;
+  const auto keep = [&](const ActionList& actions) {
+    std::vector<SendMessage> sent;
+    for (const Action& action : actions) {
+      if (const auto* send = std::get_if<SendMessage>(&action)) {
+        sent.push_back(*send);
+        all.push_back(send->bytes);
+      }
+    }
+    return sent;
+  };
+  const auto reference = ReferenceTime{Duration{1'800'000'000s} + Duration::from_ns(5.5)};
+  const FreeRunningTime now{Duration{1s} + Duration::from_ns(0.25)};
+  keep(transmitter.start(now));
+  keep(receiver.start(now));
+  const auto first = keep(transmitter.on_timer(now));  // Pdelay_Req, Announce, Sync
+  keep(transmitter.on_transmit_timestamp(first.at(2).id(), reference, now));
+  const auto answer = keep(receiver.on_event_message(first.at(0).bytes.view(), now, now));
+  keep(receiver.on_transmit_timestamp(answer.at(0).id(), now, now));
+  return all;
+}
+
+TEST_F(Tshark, reads_peer_delay_messages_and_the_tlvs_of_802_1as) {
+  const auto lines = tshark(peer_conversation(),
+                            "-e ptp.v2.messagetype -e ptp.v2.majorsdoid -e _ws.malformed "
+                            "-e ptp.v2.messagelength");
+  EXPECT_EQ(lines, (std::vector<std::string>{"0x02|0x01||54", "0x0b|0x01||76", "0x00|0x01||44",
+                                             "0x08|0x01||76", "0x03|0x01||54", "0x0a|0x01||54"}));
+  const auto answers = tshark(
+      {peer_conversation().at(4), peer_conversation().at(5)},
+      "-e ptp.v2.pdrs.requestreceipttimestamp.seconds -e ptp.v2.pdrs.requestingportidentity "
+      "-e ptp.v2.pdfu.responseorigintimestamp.seconds -e ptp.v2.pdfu.requestingportidentity");
+  EXPECT_EQ(answers,
+            (std::vector<std::string>{"1|0x020000fffe00000a||", "||1|0x020000fffe00000a"}));
+}
+
 }  // namespace
 }  // namespace ftcs::ptp

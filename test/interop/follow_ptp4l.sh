@@ -9,7 +9,7 @@ ftcs=$(realpath "${1:-build/ftcs}")
 duration=${2:-12}
 transport=${3:-UDPv4}
 mechanism=${4:-E2E}
-require ip ptp4l tshark
+require ip ptp4l tshark dumpcap
 make_network
 choose_profile "$transport" "$mechanism"
 start_ptp4l transmitter "logSyncInterval -3" "logMinDelayReqInterval -3" "${theirs_too[@]}"

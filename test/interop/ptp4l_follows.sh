@@ -10,7 +10,7 @@ duration=${2:-12}
 transport=${3:-UDPv4}
 mechanism=${4:-E2E}
 skew_ppb=5000
-require ip ptp4l tshark python3
+require ip ptp4l tshark dumpcap python3
 make_network
 choose_profile "$transport" "$mechanism"
 # A free-running ptp4l prints once per freq_est_interval, which cannot be shorter than a second.
