@@ -150,6 +150,50 @@ TEST(DistributedClock, a_zero_at_the_start_does_not_make_it_slew_once_the_loop_i
             Duration{Nanoseconds{1'000'000'000}});
 }
 
+// IgH's master is a kernel module and cannot be run here: the forms of its datagrams
+// (ethercat 1.5.2).
+TEST(DistributedClock, takes_the_accesses_that_the_igh_master_makes) {
+  WireBench bench;
+  bench.add({}, 50, fine_clock());
+  bench.add({.parent = 0}, -80, fine_clock());
+  const auto second = [](Command command, std::uint16_t offset) {
+    return Target::at_position(command, 1, offset);
+  };
+  // Old times, a latch of one byte, new times: the port through which the frame came has changed.
+  const auto old_times = bench.read(second(kAprd, reg::kReceiveTimePort0), 16);
+  EXPECT_EQ(bench.write({kBwr, 0, reg::kReceiveTimePort0}, std::uint8_t{0}).working_counter, 2);
+  const auto new_times = bench.read(second(kAprd, reg::kReceiveTimePort0), 16);
+  EXPECT_NE(new_times.value<std::uint32_t>(), old_times.value<std::uint32_t>());
+  EXPECT_EQ(load<std::uint32_t>(new_times.data, 4), load<std::uint32_t>(old_times.data, 4))
+      << "port 1 is closed";
+  // Offset and delay as one; then system time, receive time, offset and delay as one.
+  std::vector<std::uint8_t> offset_and_delay(12);
+  store(Bytes{offset_and_delay}, 0, std::uint64_t{5'000'000'000});
+  store(Bytes{offset_and_delay}, 8, std::uint32_t{300});
+  EXPECT_EQ(bench.exchange(second(kApwr, reg::kSystemTimeOffset), offset_and_delay).working_counter,
+            1);
+  const auto clock = bench.read(second(kAprd, reg::kSystemTime), 28);
+  EXPECT_EQ(clock.working_counter, 1);
+  EXPECT_EQ(load<std::uint64_t>(clock.data, 16), 5'000'000'000U);
+  EXPECT_EQ(load<std::uint32_t>(clock.data, 24), 300U);
+  EXPECT_GT(clock.value<std::uint64_t>(), 5'000'000'000U);
+  // AssignActivate as one word, both cycle times as one.
+  std::vector<std::uint8_t> cycles(8);
+  store(Bytes{cycles}, 0, std::uint32_t{1'000'000});
+  EXPECT_EQ(bench.write(second(kApwr, reg::kCyclicUnitControl), std::uint16_t{0}).working_counter,
+            1);
+  EXPECT_EQ(bench.exchange(second(kApwr, reg::kSync0CycleTime), cycles).working_counter, 1);
+  const std::uint64_t start =
+      bench.read(second(kAprd, reg::kSystemTime), 8).value<std::uint64_t>() + 1'000'000;
+  bench.write(second(kApwr, reg::kSync0StartTime), start);
+  bench.write(second(kApwr, reg::kCyclicUnitControl), std::uint16_t{0x0300});
+  bench.wait(Nanoseconds{10'000'000});
+  const std::uint64_t next =
+      bench.read(second(kAprd, reg::kSync0StartTime), 8).value<std::uint64_t>();
+  EXPECT_GT(next, start) << "SYNC0 runs";
+  EXPECT_EQ((next - start) % 1'000'000, 0U);
+}
+
 TEST(DistributedClock, the_speed_counter_tells_the_deviation_by_its_formula) {
   WireBench bench;
   bench.add({}, 0);
