@@ -6,8 +6,9 @@
  *
  * With slew the first phase is removed by the servo, as a PI does; without it the second cycle is put
  * where it belongs.
- * Each cycle takes back the frame of the cycle before: scheduled_ns says so. SubDevices are asked for OP
- * when the servo is locked. Exit codes: 0 locked and in OP, 1 not, 2 wrong usage. */
+ * Each cycle takes back the frame of the cycle before: scheduled_ns says so. SYNC0 comes at whole cycles,
+ * frames leave SHIFT_US after them (half a cycle). SubDevices are asked for OP when the servo is locked.
+ * Exit codes: 0 locked and in OP to the end, 1 not, 2 wrong usage. */
 #define _GNU_SOURCE
 
 #include <errno.h>
@@ -28,6 +29,7 @@ static const char* const kLaws[] = {"none", "ftcs", "pics", "adaptive"};
 
 static ecx_contextt context;
 static uint8 process_image[4096];
+static int64_t cycle_ns = 1000000;
 static int32_t phases[MOST_CYCLES]; /* of the virtual cycle, since the lock */
 
 static int64_t now_ns(void) {
@@ -51,7 +53,32 @@ static void become_realtime(void) {
          locked == 0 ? "obtained" : "refused");
 }
 
+/* Called by SOEM on the way from PREOP to SAFEOP: synchronous to SYNC0, which comes at whole cycles of
+ * reference time. SubDevices that know it by themselves refuse the object; that does no harm. */
+static int sync0_at_whole_cycles(ecx_contextt* soem, uint16 subdevice) {
+  uint16 synchronous = 2;
+  uint32 cycle = (uint32)cycle_ns;
+  uint16 limit = 17; /* a missed SYNC0 counts three, a good one takes one off: six in a row are an error */
+  if (!soem->slavelist[subdevice].hasdc) return 1;
+  ecx_SDOwrite(soem, subdevice, 0x1C32, 1, FALSE, sizeof synchronous, &synchronous, EC_TIMEOUTRXM);
+  ecx_SDOwrite(soem, subdevice, 0x1C32, 2, FALSE, sizeof cycle, &cycle, EC_TIMEOUTRXM);
+  ecx_SDOwrite(soem, subdevice, 0x10F1, 2, FALSE, sizeof limit, &limit, EC_TIMEOUTRXM);
+  ecx_dcsync0(soem, subdevice, TRUE, cycle, 0);
+  return 1;
+}
+
+/* Lets the clocks agree before SYNC0 is started: system time of the reference, written to all others. */
+static void settle_clocks(int frames) {
+  const uint16 reference = context.slavelist[context.slavelist[0].DCnext].configadr;
+  int64 time = 0;
+  int i;
+  for (i = 0; i < frames; ++i) {
+    ecx_FRMW(&context.port, reference, ECT_REG_DCSYSTIME, sizeof time, &time, EC_TIMEOUTRET);
+  }
+}
+
 static int bring_up(const char* interface) {
+  int i;
   if (!ecx_init(&context, interface)) {
     fprintf(stderr, "soem_cycle: no socket on '%s'\n", interface);
     return 0;
@@ -60,11 +87,15 @@ static int bring_up(const char* interface) {
     fprintf(stderr, "soem_cycle: no SubDevices on '%s'\n", interface);
     return 0;
   }
-  ecx_config_map_group(&context, process_image, 0);
   if (!ecx_configdc(&context)) {
     fprintf(stderr, "soem_cycle: no SubDevice has a distributed clock\n");
     return 0;
   }
+  settle_clocks(5000);
+  for (i = 1; i <= context.slavecount; ++i) {
+    context.slavelist[i].PO2SOconfig = sync0_at_whole_cycles;
+  }
+  ecx_config_map_group(&context, process_image, 0);
   ecx_statecheck(&context, 0, EC_STATE_SAFE_OP, EC_TIMEOUTSTATE);
   return 1;
 }
@@ -81,6 +112,9 @@ static int run(const ftcs_cycle_config* config, double seconds) {
   ftcs_cycle_sample frame;
   ftcs_cycle_decision decision;
   long cycle, answered = 0, complete = 0, gated = 0, judged = 0, locked_at = -1, op_at = -1;
+  long recoveries = 0;
+  unsigned long long skipped = 0;
+  int in_op = 0;
   long cycles = (long)(seconds * 1e9 / (double)config->cycle_ns);
   int64_t usual = 100000; /* how long a send takes, ns: a moving average */
   const int error = ftcs_cycle_init(&servo, sizeof servo, config);
@@ -117,22 +151,33 @@ static int run(const ftcs_cycle_config* config, double seconds) {
     if (counter > 0) ++answered;
     if (counter == expected) ++complete;
     if (decision.verdict != FTCS_CYCLE_USED) ++gated;
+    skipped += decision.skipped;
     if (decision.state != FTCS_CYCLE_LOCKED) continue;
     if (locked_at < 0) {
       locked_at = cycle;
       context.slavelist[0].state = EC_STATE_OPERATIONAL;
       ecx_writestate(&context, 0);
     }
-    if (op_at < 0 && cycle % 100 == 0 &&
-        ecx_statecheck(&context, 0, EC_STATE_OPERATIONAL, 0) == EC_STATE_OPERATIONAL) {
-      op_at = cycle;
+    if (cycle % 100 == 0) {
+      const uint16 state = ecx_statecheck(&context, 0, EC_STATE_OPERATIONAL, 0);
+      in_op = state == EC_STATE_OPERATIONAL;
+      if (in_op && op_at < 0) op_at = cycle;
+      if (!in_op && op_at >= 0) {
+        /* Some left OP: acknowledge first, ask again the next time. */
+        ++recoveries;
+        context.slavelist[0].state =
+            (state & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
+        ecx_writestate(&context, 0);
+      }
     }
     if (decision.verdict == FTCS_CYCLE_USED) phases[judged++] = (int32_t)decision.phase_error_ns;
   }
-  printf("%s: %s, locked in cycle %ld, OP in cycle %ld, rate %+.3f ppm\n", kLaws[config->law],
-         ftcs_cycle_state_name(decision.state), locked_at, op_at, decision.rate_ppb * 1e-3);
-  printf("working counter %d in %ld of %ld frames that came back, %ld cycles; %ld cycles gated or lost\n",
-         expected, complete, answered, cycles, gated);
+  printf("%s: %s, locked in cycle %ld, OP in cycle %ld, %s at the end (%ld requests to come "
+         "back), rate %+.3f ppm\n",
+         kLaws[config->law], ftcs_cycle_state_name(decision.state), locked_at, op_at,
+         in_op ? "all in OP" : "not all in OP", recoveries, decision.rate_ppb * 1e-3);
+  printf("working counter %d in %ld of %ld frames that came back, %ld cycles; %ld cycles gated or lost, %llu passed over by stalls\n",
+         expected, complete, answered, cycles, gated, skipped);
   if (judged > 0) {
     long i;
     for (i = 0; i < judged; ++i) phases[i] = abs(phases[i]);
@@ -140,7 +185,7 @@ static int run(const ftcs_cycle_config* config, double seconds) {
     printf("|phase| of the virtual cycle since the lock: p50 %d p99 %d max %d ns\n",
            phases[judged / 2], phases[judged * 99 / 100], phases[judged - 1]);
   }
-  return decision.state == FTCS_CYCLE_LOCKED && op_at > 0;
+  return decision.state == FTCS_CYCLE_LOCKED && in_op;
 }
 
 int main(int argc, char** argv) {
@@ -160,8 +205,9 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
-  config.cycle_ns = argc > 4 ? atoi(argv[4]) * 1000LL : 1000000;
-  config.shift_ns = argc > 5 ? atoi(argv[5]) * 1000LL : config.cycle_ns / 2;
+  if (argc > 4) cycle_ns = atoi(argv[4]) * 1000LL;
+  config.cycle_ns = cycle_ns;
+  config.shift_ns = argc > 5 ? atoi(argv[5]) * 1000LL : cycle_ns / 2; /* half-way between SYNC0s */
   if (argc > 6) config.align_at_start = strcmp(argv[6], "slew") != 0;
   become_realtime();
   if (bring_up(argv[1])) {
