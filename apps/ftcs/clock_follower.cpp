@@ -193,7 +193,7 @@ void ClockFollower::report_text(const SampleRecord& record, std::optional<Durati
 std::uint64_t ClockFollower::samples_per_summary(std::optional<Duration> sync_interval) const {
   if (!sync_interval || *sync_interval <= Duration{}) return 1;
   const double samples = std::exp2(options_.summary_interval) / sync_interval->seconds();
-  return samples < 2.0 ? 1 : static_cast<std::uint64_t>(samples);
+  return samples < 2.0 ? 1 : static_cast<std::uint64_t>(std::llround(samples));
 }
 
 void ClockFollower::log_summary() {

@@ -38,6 +38,8 @@ class ClockFollower {
   void log_summary();
 
   [[nodiscard]] bool locked() const { return discipline_.locked(); }
+  /// Of all used samples since the first lock.
+  [[nodiscard]] double offset_rms_ns() const { return since_lock_.offset_rms(); }
   [[nodiscard]] const ClockDiscipline& discipline() const { return discipline_; }
 
   /// A message that did not steer, and why.

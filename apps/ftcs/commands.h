@@ -25,5 +25,6 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code);
 void add_paper_command(CLI::App& app, int& exit_code);
 void add_ptp_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
+void add_status_command(CLI::App& app, int& exit_code);
 
 }  // namespace ftcs::app

@@ -24,6 +24,7 @@ int run(int argc, char** argv) {
   add_paper_command(app, exit_code);
   add_ptp_command(app, exit_code);
   add_simulate_command(app, exit_code);
+  add_status_command(app, exit_code);
   const auto is_command = [&app](const std::string& name) {
     return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })
                 .empty();

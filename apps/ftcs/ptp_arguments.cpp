@@ -108,7 +108,19 @@ void add_clock_flags(CLI::App& command, PtpArguments& arguments) {
 void add_run_flags(CLI::App& command, PtpArguments& arguments) {
   command.add_option("--role", arguments.role, "time-receiver (default) or time-transmitter")
       ->check(CLI::IsMember({"time-receiver", "time-transmitter"}));
+  command
+      .add_option("--source", arguments.source,
+                  "of timestamps: network (default), or ptp4l, a free-running one on this machine")
+      ->check(CLI::IsMember({"network", "ptp4l"}));
   Flags flags(command);
+  flags.value("--ptp4l-socket", arguments.ptp4l_socket, "PATH",
+              "with --source ptp4l: its uds_address; default /var/run/ptp4l");
+  flags.value("--chrony-sock", arguments.chrony_socket, "PATH",
+              "samples for chronyd: the path of its refclock SOCK");
+  flags
+      .value("--ntp-shm", arguments.ntp_shm_unit, "UNIT",
+             "samples for ntpd, chronyd or gpsd through NTP's shared memory")
+      ->check(integer_from(0, 255));
   auto* json = flags.given("--json", arguments.json, "one JSON object a sample");
   flags.given("--csv", arguments.csv, "one CSV line a sample")->excludes(json);
   flags.value("--duration", arguments.duration_s, "SECONDS", "stop after so many seconds")

@@ -20,6 +20,10 @@ struct PtpArguments {
   bool hardware = false;
   bool software = false;
   std::string role;
+  std::string source;
+  std::string ptp4l_socket;
+  std::string chrony_socket;
+  std::optional<int> ntp_shm_unit;
   std::string servo;
   std::optional<double> offset_gain;
   std::string converged_band;

@@ -7,6 +7,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
+#include "apps/ftcs/management_server.h"
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_port.h"
@@ -137,6 +138,12 @@ Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
     }
     options.interface = arguments.interfaces.front();
   }
+  if (arguments.source == "ptp4l") {
+    options.source = Source::kPtp4l;
+    if (!arguments.ptp4l_socket.empty()) options.ptp4l_socket = arguments.ptp4l_socket;
+    if (options.role == Role::kTimeTransmitter) return "--source: only a time receiver has one";
+    return std::nullopt;  // the interface is ptp4l's to know
+  }
   if (options.interface.empty()) return "no interface: give one with -i, for example -i eth0";
   options.socket.interface = options.interface;
   if (arguments.event_port) options.socket.event_port = *arguments.event_port;
@@ -145,6 +152,23 @@ Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
     return "--event-port and --general-port must differ";
   }
   return apply_peer(arguments, options);
+}
+
+Wrong apply_feed(const PtpArguments& arguments, PtpOptions& options) {
+  options.chrony_socket = arguments.chrony_socket;
+  options.ntp_shm_unit = arguments.ntp_shm_unit;
+  if (options.chrony_socket.empty() && !options.ntp_shm_unit) return std::nullopt;
+  const char* const flag = options.ntp_shm_unit ? "--ntp-shm" : "--chrony-sock";
+  if (options.role == Role::kTimeTransmitter) {
+    return fmt::format("{}: a time transmitter follows nobody", flag);
+  }
+  if (options.clock == ClockKind::kSystem || options.clock == ClockKind::kAuto) {
+    return fmt::format(
+        "{}: then two programs would steer the system clock; use --clock virtual or "
+        "phc",
+        flag);
+  }
+  return std::nullopt;
 }
 
 Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
@@ -174,7 +198,8 @@ Wrong make_options(const PtpArguments& arguments, PtpOptions& options) {
   for (const auto& [name, value] : arguments.settings) {
     if (auto wrong = apply_setting(options, name, value)) return "--" + *wrong;
   }
-  for (const auto step : {apply_role, apply_network, apply_trust, apply_clock, apply_servo}) {
+  for (const auto step :
+       {apply_role, apply_network, apply_trust, apply_clock, apply_feed, apply_servo}) {
     if (auto wrong = step(arguments, options)) return wrong;
   }
   return std::nullopt;
@@ -193,6 +218,9 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
       fmt::print(stderr, "ftcs ptp: {}\n", *wrong);
       exit_code = kUsageError;
       return;
+    }
+    if (!options.uds_address_given) {
+      options.uds_address = platform::writable_socket_path(kSocketName);
     }
     platform::LinuxKernel kernel;
     exit_code = run_ptp(kernel, options);

@@ -152,6 +152,12 @@ Wrong set_timeout(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
+Wrong set_uds_address(PtpOptions& options, std::string_view text) {
+  options.uds_address = text == "none" ? "" : text;
+  options.uds_address_given = true;
+  return std::nullopt;
+}
+
 Wrong set_max_frequency(PtpOptions& options, std::string_view text) {
   const auto ppb = parse_number(text, 1.0, 900'000'000.0);
   if (!ppb) return ppb.error().message;
@@ -254,6 +260,11 @@ constexpr std::array kSettings{
                FTCS_SET(number(v, o.servo.linuxptp_pi.integral_exponent, -1e3))},
     PtpSetting{"pi_integral_norm_max", "greatest gain per sample",
                FTCS_SET(number(v, o.servo.linuxptp_pi.integral_norm_max))},
+    PtpSetting{"uds_address", "the management socket, or none; default /var/run/ftcs",
+               set_uds_address},
+    PtpSetting{"slave_event_monitor",
+               "with --source ptp4l: ptp4l's setting of that name; default /var/run/ftcs-monitor",
+               FTCS_SET((o.monitor_socket = v, Wrong{}))},
     PtpSetting{"logging_level", "0 to 7", FTCS_SET(integer(v, o.log_level, 0, 7))},
     PtpSetting{"summary_interval", "log2 of seconds, -7 to 20",
                FTCS_SET(integer(v, o.summary_interval, -7, 20))},
@@ -303,7 +314,6 @@ constexpr std::array kFixed{
     Fixed{"servo_offset_threshold", "0"},
     Fixed{"write_phase_mode", "0"},
     Fixed{"step_window", "0"},
-    Fixed{"uds_address", kAny},  // there is no management socket
     Fixed{"uds_ro_address", kAny},
     Fixed{"clock_type", "OC"},
     Fixed{"tsproc_mode", "filter"},

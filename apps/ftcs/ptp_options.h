@@ -26,6 +26,11 @@ enum class ClockKind : std::uint8_t {
   kPhc,      ///< the adapter's PTP hardware clock
   kAuto,     ///< the adapter's, if it has one, else CLOCK_REALTIME
 };
+/// Where a time receiver's timestamps come from.
+enum class Source : std::uint8_t {
+  kNetwork,  ///< our own sockets
+  kPtp4l,    ///< the slave_event_monitor of a ptp4l on this machine
+};
 enum class Output : std::uint8_t { kText, kJson, kCsv };
 
 /// As the servos' own, but for one: Sync messages of a busy machine come early or late by a tenth
@@ -42,6 +47,10 @@ enum class Output : std::uint8_t { kText, kJson, kCsv };
 struct PtpOptions {
   std::string interface;
   Role role = Role::kTimeReceiver;
+
+  Source source = Source::kNetwork;
+  std::string monitor_socket = "/var/run/ftcs-monitor";  ///< ptp4l's slave_event_monitor
+  std::string ptp4l_socket = "/var/run/ptp4l";           ///< ptp4l's uds_address, to ask it
 
   platform::PtpSocketConfig socket{};
   platform::TimestampMode timestamps = platform::TimestampMode::kBestAvailable;
@@ -88,6 +97,13 @@ struct PtpOptions {
   std::optional<platform::TimestampClock::RealtimeReading> start{};
   Duration initial_offset{};  ///< of the virtual clock against CLOCK_REALTIME
   double skew_ppb = 0.0;      ///< of the virtual clock's oscillator
+
+  /// The management socket; empty: none. Named by the user, it must be had.
+  std::string uds_address;
+  bool uds_address_given = false;
+
+  std::string chrony_socket{};        ///< refclock SOCK of a chronyd; empty: none
+  std::optional<int> ntp_shm_unit{};  ///< NTP's shared memory; none: none
 
   int log_level = 6;         ///< syslog's: 0 emergency to 7 debug
   int summary_interval = 0;  ///< log2 of seconds

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/monitor_receiver.h"
 #include "apps/ftcs/ptp_clock.h"
 #include "apps/ftcs/ptp_receiver.h"
 #include "apps/ftcs/ptp_transmitter.h"
@@ -38,10 +39,11 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
 
 int PtpPort::run() {
   for (const std::string& note : options_.notes) log_(LogLevel::kNotice, "{}", note);
-  if (const auto error = transport_.open()) {
+  if (const auto error = open_source()) {
     log_(LogLevel::kError, "{}", error->message());
     return kRuntimeError;
   }
+  if (!open_management() || !open_feed()) return kRuntimeError;
   report_stamps();
   if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
   const platform::StopFlag stop;
@@ -63,13 +65,54 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (end) until = std::min(until, *end);
   if (const auto due = deadline()) until = std::min(until, *due);
   if (real_clock_ != nullptr) real_clock_->before_wait();
-  transport_.wait_until(oscillator_.to_underlying(until));
+  wait_until(oscillator_.to_underlying(until));
   if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
   for (const ptp::EventId& id : std::exchange(unsent_, {})) {
     perform(on_sent(id, std::nullopt, now()));
   }
   report_stamps();
+  if (management_) management_->serve(*managed());
   housekeeping(now());
+}
+
+bool PtpPort::open_feed() {
+  auto feed = TimeFeed::open(options_);
+  if (feed) {
+    feed_.emplace(std::move(*feed));
+  } else {
+    log_(LogLevel::kError, "{}", feed.error());
+  }
+  return feed.ok();
+}
+
+void PtpPort::set_scale(const ReferenceScale& scale) {
+  if (real_clock_ != nullptr) real_clock_->set_reference_scale(scale);
+  if (feed_) feed_->set_scale(scale);
+}
+
+void PtpPort::feed_others(const ClockFollower& follower) {
+  if (!feed_ || !feed_->is_on()) return;
+  const auto reading = timestamps_->read_realtime();
+  const FreeRunningTime instant = oscillator_.from_underlying(reading.free_running);
+  feed_->publish(follower, clock().local_at(instant), reading.realtime_ns, log_);
+}
+
+bool PtpPort::open_management() {
+  if (options_.uds_address.empty() || managed() == nullptr) return true;
+  auto opened = ManagementServer::open(options_.uds_address);
+  if (opened) {
+    management_.emplace(std::move(*opened));
+    transport_.watch(management_->descriptor());
+    return true;
+  }
+  if (options_.uds_address_given) {
+    log_(LogLevel::kError, "{}", opened.error().message());
+    return false;
+  }
+  // Another instance, on another port, has the usual place: that is no reason not to follow.
+  log_(LogLevel::kNotice, "no management socket: {} (--uds_address names another)",
+       opened.error().message());
+  return true;
 }
 
 void PtpPort::perform(const ptp::ActionList& actions) {
@@ -199,8 +242,10 @@ Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& ker
   return ptp::PortIdentity{ptp::ClockIdentity::from_mac(*address), 1};
 }
 
-int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
+int run_ptp(platform::Kernel& kernel, const PtpOptions& given) {
+  PtpOptions options = given;
   Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
+  if (options.source == Source::kPtp4l) complete_by_ptp4l(options, log);
   auto clocks = open_ptp_clocks(kernel, options, log);
   if (!clocks) {
     log(LogLevel::kError, "{}", clocks.error());
@@ -211,12 +256,19 @@ int run_ptp(platform::Kernel& kernel, const PtpOptions& options) {
     log(LogLevel::kError, "{}", identity.error().message());
     return kRuntimeError;
   }
-  if (options.role == Role::kTimeReceiver) {
-    return PtpReceiver(kernel, options, log, std::move(clocks->timestamps), *identity,
-                       clocks->real.get())
-        .run();
+  PortFacts facts{*identity};
+  facts.hardware_stamps = clocks->timestamps->is_hardware();
+  if (const auto address = platform::identity_address(kernel, options.interface)) {
+    facts.address = *address;
   }
-  return PtpTransmitter(kernel, options, log, std::move(clocks->timestamps), *identity).run();
+  RealClock* const real = clocks->real.get();
+  if (options.source == Source::kPtp4l) {
+    return MonitorReceiver(kernel, options, log, std::move(clocks->timestamps), facts, real).run();
+  }
+  if (options.role == Role::kTimeReceiver) {
+    return PtpReceiver(kernel, options, log, std::move(clocks->timestamps), facts, real).run();
+  }
+  return PtpTransmitter(kernel, options, log, std::move(clocks->timestamps), facts).run();
 }
 
 }  // namespace ftcs::app

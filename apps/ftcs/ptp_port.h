@@ -10,8 +10,11 @@
 #include <vector>
 
 #include "apps/ftcs/log.h"
+#include "apps/ftcs/management_server.h"
+#include "apps/ftcs/port_data_sets.h"
 #include "apps/ftcs/ptp_options.h"
 #include "apps/ftcs/real_clock.h"
+#include "apps/ftcs/time_feed.h"
 #include "ftcs/clock/skewed_source.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/platform/ptp_transport.h"
@@ -49,6 +52,12 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] virtual std::optional<FreeRunningTime> deadline() const = 0;
   /// Actions that only one of the roles knows.
   virtual void act(const ptp::Action& action) = 0;
+  /// Opens where timestamps come from, and waits for them; the network's sockets, unless a port has
+  /// none. `underlying`: on the oscillator without skew.
+  [[nodiscard]] virtual std::optional<platform::OsError> open_source() { return transport_.open(); }
+  virtual void wait_until(FreeRunningTime underlying) { transport_.wait_until(underlying); }
+  /// Who answers the management socket; null: nobody, and there is none.
+  [[nodiscard]] virtual Managed* managed() { return nullptr; }
   /// Once per turn of the loop.
   virtual void housekeeping(FreeRunningTime) {}
   /// Writes the summary, returns the exit code.
@@ -59,6 +68,14 @@ class PtpPort : private platform::TransportHandler {
   void log_unusual(const ptp::Counters& counters);
   /// What the peer delay mechanism has measured, if it has.
   void log_peer_delay(const ptp::PeerDelay& peer_delay);
+  /// The reference's timescale, for a real clock and for other programs.
+  void set_scale(const ReferenceScale& scale);
+  /// Tells chrony and the like, if that is wanted.
+  void feed_others(const ClockFollower& follower);
+  /// Whether anybody needs to know the timescale.
+  [[nodiscard]] bool needs_scale() const {
+    return real_clock_ != nullptr || (feed_ && feed_->is_on());
+  }
   /// Ends run() with an error line.
   void fail(const std::string& reason);
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
@@ -72,6 +89,8 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] const PtpOptions& options() const { return options_; }
   [[nodiscard]] Log& log() { return log_; }
   [[nodiscard]] double seconds_since_start() { return (now() - start_.free_running).seconds(); }
+  [[nodiscard]] platform::PtpTransport& transport() { return transport_; }
+  [[nodiscard]] platform::TimestampClock& timestamps() { return *timestamps_; }
   [[nodiscard]] bool has_hardware_stamps() const { return timestamps_->is_hardware(); }
 
  private:
@@ -81,6 +100,8 @@ class PtpPort : private platform::TransportHandler {
   void on_readable(int descriptor) override;
   void send(const ptp::SendMessage& message);
   [[nodiscard]] std::optional<platform::OsError> hand_over(const ptp::SendMessage& message);
+  [[nodiscard]] bool open_management();
+  [[nodiscard]] bool open_feed();
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
 
@@ -92,6 +113,8 @@ class PtpPort : private platform::TransportHandler {
   VirtualClock virtual_clock_;
   RealClock* real_clock_;
   platform::PtpTransport transport_;
+  std::optional<TimeFeed> feed_{};
+  std::optional<ManagementServer> management_{};
   platform::SocketAddress sender_{};  ///< of the message that is being handled
   platform::SocketAddress transmitter_{};
   std::optional<platform::StampSource> reported_stamps_{};

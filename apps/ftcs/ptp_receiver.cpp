@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/status_report.h"
 
 namespace ftcs::app {
 namespace {
@@ -32,26 +33,18 @@ ptp::TimeReceiverConfig core_config(const PtpOptions& options, const ptp::PortId
   return config;
 }
 
-ReferenceScale scale_of(const ptp::TransmitterData& transmitter) {
-  const auto has = [&](std::uint16_t mask) { return (transmitter.flags & mask) != 0; };
-  ReferenceScale scale;
-  scale.tai = has(ptp::flag::kPtpTimescale);
-  if (has(ptp::flag::kUtcOffsetValid)) scale.utc_offset = transmitter.announce.utc_offset;
-  scale.leap = (has(ptp::flag::kLeap61) ? 1 : 0) - (has(ptp::flag::kLeap59) ? 1 : 0);
-  return scale;
-}
-
 }  // namespace
 
 PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                          std::unique_ptr<platform::TimestampClock> timestamps,
-                         const ptp::PortIdentity& identity, RealClock* real_clock)
+                         const PortFacts& facts, RealClock* real_clock)
     : PtpCorePort(kernel, options, log, std::move(timestamps),
-                  core_config(options, identity,
+                  core_config(options, facts.identity,
                               static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW))),
                   real_clock),
       follower_(this->options(), log, clock(), now(), has_hardware_stamps(),
-                "port 1 (" + options.interface + ")") {}
+                "port 1 (" + options.interface + ")"),
+      facts_(facts) {}
 
 ptp::ActionList PtpReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
@@ -79,7 +72,7 @@ void PtpReceiver::act(const ptp::Action& action) {
 }
 
 void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
-  if (real_clock() != nullptr) real_clock()->set_reference_scale(scale_of(selected.transmitter));
+  set_scale(reference_scale(selected.transmitter.flags, selected.transmitter.announce.utc_offset));
   if (!selected.changed) return;
   log()(LogLevel::kNotice, "selected best master clock {}",
         to_text(selected.transmitter.announce.grandmaster).view());
@@ -95,6 +88,7 @@ void PtpReceiver::on_pair(const EventPair& pair) {
     return fail(*wrong);
   }
   follow_lock(follower_.locked());
+  feed_others(follower_);
 }
 
 // From the port's state and not from a change of the lock: after a fault shorter than the lock's
@@ -124,6 +118,15 @@ int PtpReceiver::finish() {
   log_peer_delay(core().peer_delay());
   log_unusual(core().counters());
   return follower_.locked() ? kSuccess : kNotLocked;
+}
+
+ptp::ManagedPort PtpReceiver::managed_port() {
+  return data_sets(options(), facts_, core(), follower_, now());
+}
+
+std::string PtpReceiver::status(const ptp::ManagementCounters& management) {
+  const StatusOfPort port{options(), facts_, seconds_since_start(), management};
+  return receiver_status(port, core(), follower_, now());
 }
 
 }  // namespace ftcs::app

@@ -10,17 +10,20 @@
 namespace ftcs::app {
 
 /// A clock, virtual or real, that follows a PTP time transmitter.
-class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver> {
+class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver>, private Managed {
  public:
   PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
-              std::unique_ptr<platform::TimestampClock> timestamps,
-              const ptp::PortIdentity& identity, RealClock* real_clock);
+              std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
+              RealClock* real_clock);
 
  private:
   ptp::ActionList start(FreeRunningTime now) override;
   void act(const ptp::Action& action) override;
   void housekeeping(FreeRunningTime now) override;
   [[nodiscard]] int finish() override;
+  [[nodiscard]] Managed* managed() override { return this; }
+  [[nodiscard]] ptp::ManagedPort managed_port() override;
+  [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
 
   void on_pair(const EventPair& pair);
   void on_selected(const ptp::TransmitterSelected& selected);
@@ -28,6 +31,7 @@ class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver> {
 
   ClockFollower follower_;
   bool had_transmitter_ = false;
+  PortFacts facts_;
 };
 
 }  // namespace ftcs::app

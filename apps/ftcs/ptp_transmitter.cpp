@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/status_report.h"
 
 namespace ftcs::app {
 namespace {
@@ -36,8 +37,10 @@ ptp::TimeTransmitterConfig core_config(const PtpOptions& options,
 
 PtpTransmitter::PtpTransmitter(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                                std::unique_ptr<platform::TimestampClock> timestamps,
-                               const ptp::PortIdentity& identity)
-    : PtpCorePort(kernel, options, log, std::move(timestamps), core_config(options, identity)) {}
+                               const PortFacts& facts)
+    : PtpCorePort(kernel, options, log, std::move(timestamps),
+                  core_config(options, facts.identity)),
+      facts_(facts) {}
 
 int PtpTransmitter::finish() {
   using ptp::Counter;
@@ -49,6 +52,13 @@ int PtpTransmitter::finish() {
   log_peer_delay(core().peer_delay());
   log_unusual(counters);
   return transmitting ? kSuccess : kNotLocked;
+}
+
+ptp::ManagedPort PtpTransmitter::managed_port() { return data_sets(options(), facts_, core()); }
+
+std::string PtpTransmitter::status(const ptp::ManagementCounters& management) {
+  const StatusOfPort port{options(), facts_, seconds_since_start(), management};
+  return transmitter_status(port, core());
 }
 
 }  // namespace ftcs::app

@@ -9,15 +9,19 @@
 namespace ftcs::app {
 
 /// A virtual clock that other clocks follow: a grandmaster for the laboratory. Nobody steers it.
-class PtpTransmitter final : public PtpCorePort<ptp::TimeTransmitter> {
+class PtpTransmitter final : public PtpCorePort<ptp::TimeTransmitter>, private Managed {
  public:
   PtpTransmitter(platform::Kernel& kernel, const PtpOptions& options, Log& log,
-                 std::unique_ptr<platform::TimestampClock> timestamps,
-                 const ptp::PortIdentity& identity);
+                 std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts);
 
  private:
   void act(const ptp::Action&) override {}
   [[nodiscard]] int finish() override;
+  [[nodiscard]] Managed* managed() override { return this; }
+  [[nodiscard]] ptp::ManagedPort managed_port() override;
+  [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
+
+  PortFacts facts_;
 };
 
 }  // namespace ftcs::app

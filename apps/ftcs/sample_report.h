@@ -56,6 +56,7 @@ class SampleSummary {
   void add(const SampleRecord& record) noexcept;
   void reset() noexcept { *this = {}; }
   [[nodiscard]] std::uint64_t count() const noexcept { return offset_.count(); }
+  [[nodiscard]] double offset_rms() const noexcept { return offset_.rms(); }
   [[nodiscard]] std::string text() const;
 
  private:

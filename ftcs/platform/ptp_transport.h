@@ -54,6 +54,9 @@ class PtpTransport {
   /// event or a signal, and at the latest after a quarter of a second.
   void wait_until(FreeRunningTime deadline);
 
+  /// As wait_until(), for the watched descriptors alone: without sockets of its own, and without
+  /// trying to open any.
+  void wait_watched(FreeRunningTime deadline) { poll_sockets(deadline); }
   /// Another descriptor that ends the wait when it can be read: a timer finer than poll's
   /// milliseconds. At most kLargestWatch; a negative one is none.
   void watch(int descriptor) {

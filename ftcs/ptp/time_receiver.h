@@ -97,6 +97,7 @@ class TimeReceiver {
   [[nodiscard]] PortState state() const noexcept { return port_.state(); }
   /// The selected transmitter; null if there is none.
   [[nodiscard]] const TransmitterData* transmitter() const noexcept;
+  [[nodiscard]] DelayMechanism delay_mechanism() const noexcept { return config_.delay_mechanism; }
   /// What the neighbour at the other end of the link measured as; peer to peer only.
   [[nodiscard]] const PeerDelay& peer_delay() const noexcept { return peer_delay_; }
   /// Rate of the grandmaster in units of our oscillator by the Follow_Up information (802.1AS-2020,
@@ -104,6 +105,10 @@ class TimeReceiver {
   [[nodiscard]] std::optional<Rate> grandmaster_rate_ratio() const noexcept;
   /// Its Sync interval, once a multicast Sync has told it.
   [[nodiscard]] std::optional<Duration> sync_interval() const noexcept { return sync_interval_; }
+  /// Mean time between Delay_Req messages, as configured or as the transmitter demands.
+  [[nodiscard]] Duration delay_request_interval() const noexcept {
+    return delay_requests_.interval();
+  }
   [[nodiscard]] const Counters& counters() const noexcept { return port_.counters(); }
 
  private:

@@ -82,6 +82,17 @@ expect 2 "ptp.conf:1: section 'unicast_master_table' is not supported" ptp -i lo
 expect 1 "interface nosuch0: no such device" ptp -i nosuch0
 expect 1 "hardware time stamping on lo" ptp -i lo -H
 
+# Sockets and sources.
+expect 1 "socket $folder/none/ftcs: No such file" ptp -i lo --event-port 20319 --general-port 20320 --uds_address "$folder/none/ftcs"
+expect 1 "socket $folder/none: No such file" status -s "$folder/none"
+expect 1 "already in use" ptp -i lo --event-port 20319 --general-port 20320 --uds_address "$folder/out"
+expect 2 "--source" ptp --source chrony
+expect 2 "only a time receiver" ptp --source ptp4l --role time-transmitter
+expect 1 "socket $folder/none/monitor: No such file" ptp --source ptp4l --slave_event_monitor "$folder/none/monitor" -S
+expect 2 "--ntp-shm: '256': expected an integer" ptp -i lo --ntp-shm 256
+expect 2 "follows nobody" ptp -i lo --role time-transmitter --chrony-sock "$folder/chrony"
+expect 2 "two programs would steer" ptp -i lo --clock system --chrony-sock "$folder/chrony"
+
 # A port that another program holds: a unicast port belongs to one.
 ports=(--event-port $((20000 + $$ % 10000)) --general-port $((30000 + $$ % 10000)))
 "$ftcs" ptp -i lo "${ports[@]}" --unicast 127.0.0.1 > /dev/null 2>&1 &

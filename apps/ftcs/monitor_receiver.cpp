@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/monitor_receiver.h"
+
+#include <utility>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/status_report.h"
+
+namespace ftcs::app {
+namespace {
+
+// ptp4l may need some seconds to select a transmitter; its longest usual Sync interval is 2 s.
+constexpr Duration kPatience{std::chrono::seconds{10}};
+// Two-way samples are rarer than Syncs.
+constexpr std::uint64_t kSyncsWithoutDelay = 32;
+constexpr int kReportsAtOnce = 64;
+
+/// What the ptp4l that serves this management socket says, if it answers.
+template <class Data>
+std::optional<Data> ask_ptp4l(const PtpOptions& options, ptp::ManagementId id, int patience_ms) {
+  auto client = platform::LocalSocket::client();
+  if (!client) return std::nullopt;
+  ptp::ManagementMessage question;
+  question.header.domain = options.domain;
+  question.header.major_sdo_id = options.major_sdo_id;
+  question.header.minor_version = 0;  // every version of linuxptp takes it
+  question.body.target.clock.octets.fill(0xFF);
+  question.body.target.port = 0xFFFF;
+  question.id = id;
+  if (client->send(options.ptp4l_socket, ptp::encode_management(question).view())) {
+    return std::nullopt;
+  }
+  client->wait(patience_ms);
+  const auto answer = client->receive();
+  if (!answer) return std::nullopt;
+  const auto message = ptp::decode_management(answer->bytes);
+  if (!message || !message->data) return std::nullopt;
+  const auto* data = std::get_if<Data>(&*message->data);
+  return data != nullptr ? std::optional(*data) : std::nullopt;
+}
+
+}  // namespace
+
+MonitorReceiver::MonitorReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+                                 std::unique_ptr<platform::TimestampClock> timestamps,
+                                 const PortFacts& facts, RealClock* real_clock)
+    : PtpPort(kernel, options, log, std::move(timestamps), real_clock),
+      facts_(facts),
+      follower_(this->options(), log, clock(), now(), has_hardware_stamps(), "ptp4l") {}
+
+std::optional<platform::OsError> MonitorReceiver::open_source() {
+  auto socket = platform::LocalSocket::bind(options().monitor_socket);
+  if (!socket) return socket.error();
+  socket_.emplace(std::move(*socket));
+  transport().watch(socket_->descriptor());
+  return std::nullopt;
+}
+
+ptp::ActionList MonitorReceiver::start(FreeRunningTime now) {
+  if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
+  last_report_ = now;
+  log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",
+        has_hardware_stamps() ? "hardware" : "software", options().monitor_socket);
+  return {};
+}
+
+void MonitorReceiver::wait_until(FreeRunningTime underlying) {
+  transport().wait_watched(underlying);
+}
+
+void MonitorReceiver::housekeeping(FreeRunningTime now) {
+  ask_for_timescale(now);
+  read_reports();
+  follower_.on_silence();
+  if (real_clock() != nullptr) {
+    const bool steering = follower_.discipline().counters().commands > 0;
+    const auto wrong =
+        real_clock()->attend(steering, follower_.locked(), follower_.discipline().latest().servo);
+    if (wrong) fail(*wrong);
+  }
+  watch_for_silence(now);
+  log_lock();
+}
+
+// A real clock shows UTC or TAI, chrony UTC; ptp4l's reports do not say which the reference does.
+void MonitorReceiver::ask_for_timescale(FreeRunningTime now) {
+  constexpr Duration kInterval{std::chrono::seconds{30}};
+  if (!needs_scale() || now < next_question_) return;
+  const bool first = next_question_ == FreeRunningTime{};
+  next_question_ = now + kInterval;
+  const auto properties = ask_ptp4l<ptp::TimePropertiesDataSet>(
+      options(), ptp::ManagementId::kTimePropertiesDataSet, first ? 500 : 30);
+  if (properties) {
+    set_scale(reference_scale(properties->flags, properties->utc_offset));
+  } else if (first) {
+    fail("ptp4l does not answer on " + options().ptp4l_socket +
+         " (--ptp4l-socket), and nothing else says whether its reference shows TAI or UTC");
+  }
+}
+
+void MonitorReceiver::read_reports() {
+  for (int i = 0; i < kReportsAtOnce; ++i) {
+    const auto datagram = socket_->receive();
+    if (!datagram) return;
+    const auto before = source_.transmitter();
+    const auto events = source_.on_datagram(datagram->bytes);
+    if (events.size > 0) last_report_ = now();
+    if (source_.transmitter() != before) {
+      log()(LogLevel::kNotice, "ptp4l: samples of the transmitter {}",
+            to_text(*source_.transmitter()).view());
+    }
+    for (const auto& event : events) on_sample(event);
+  }
+}
+
+void MonitorReceiver::on_sample(const ptp::MonitorSource::Event& event) {
+  if (event.new_reference) {
+    log()(LogLevel::kWarning, "ptp4l: another transmitter, or its time jumped; starting anew");
+    follower_.on_new_reference();
+  }
+  const ptp::MonitorSample& sample = event.sample;
+  const auto stamp = timestamps().convert({sample.local_ns, sample.local_ns});
+  if (!stamp) return;  // CLOCK_REALTIME was set in between: counted there
+  const EventPair pair{sample.direction, sample.reference,
+                       oscillator().from_underlying(stamp->time)};
+  if (const auto wrong = follower_.on_pair(pair, now(), source_.sync_interval()))
+    return fail(*wrong);
+  feed_others(follower_);
+}
+
+void MonitorReceiver::watch_for_silence(FreeRunningTime now) {
+  const bool silent = now - last_report_ > kPatience;
+  if (silent && !silent_) {
+    log()(
+        LogLevel::kWarning,
+        "nothing from ptp4l for {:.0f} s: is it running, in state SLAVE or UNCALIBRATED, and does "
+        "its configuration say 'slave_event_monitor {}' and 'free_running 1'?",
+        kPatience.seconds(), options().monitor_socket);
+  }
+  if (!silent && silent_) log()(LogLevel::kNotice, "ptp4l reports again");
+  silent_ = silent;
+  const ptp::MonitorCounters& counters = source_.counters();
+  if (!delays_missing_ && counters.delays == 0 && counters.syncs >= kSyncsWithoutDelay) {
+    delays_missing_ = true;
+    log()(LogLevel::kWarning,
+          "ptp4l reports Syncs but no delays: only 'delay_mechanism E2E' has them in its reports");
+  }
+}
+
+void MonitorReceiver::log_lock() {
+  const bool locked = follower_.locked();
+  if (locked != was_locked_)
+    log()(LogLevel::kNotice, "ptp4l: {}", locked ? "locked" : "not locked");
+  was_locked_ = locked;
+}
+
+ptp::PortState MonitorReceiver::state() const {
+  if (follower_.locked()) return ptp::PortState::kTimeReceiver;
+  return source_.transmitter() ? ptp::PortState::kUncalibrated : ptp::PortState::kListening;
+}
+
+int MonitorReceiver::finish() {
+  follower_.log_summary();
+  const ptp::MonitorCounters& counters = source_.counters();
+  log()(
+      LogLevel::kNotice,
+      "reports: {} Syncs, {} delays; {} malformed, {} unknown TLVs, {} missed Syncs, {} repeated, "
+      "{} restarts, {} transmitter changes, {} reference jumps, {} steps of CLOCK_REALTIME",
+      counters.syncs, counters.delays, counters.malformed, counters.unknown_tlvs,
+      counters.missed_syncs, counters.repeated, counters.restarts, counters.transmitter_changes,
+      counters.reference_jumps, timestamps().realtime_steps());
+  return follower_.locked() ? kSuccess : kNotLocked;
+}
+
+ptp::ManagedPort MonitorReceiver::managed_port() {
+  return data_sets(options(), facts_, state(), source_.transmitter(), follower_, now());
+}
+
+std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
+  const StatusOfPort port{options(), facts_, seconds_since_start(), management};
+  return monitor_status(port, source_, state(), follower_, now());
+}
+
+void complete_by_ptp4l(PtpOptions& options, Log& log) {
+  using platform::TimestampMode;
+  const auto properties =
+      ask_ptp4l<ptp::PortPropertiesNp>(options, ptp::ManagementId::kPortPropertiesNp, 500);
+  if (options.timestamps == TimestampMode::kBestAvailable) {
+    const bool hardware = properties && properties->timestamping != 0;
+    options.timestamps = hardware ? TimestampMode::kHardware : TimestampMode::kSoftware;
+    if (!properties) {
+      log(LogLevel::kNotice,
+          "no ptp4l answers on {} (--ptp4l-socket): taking its timestamps for software ones (-H -i "
+          "for hardware)",
+          options.ptp4l_socket);
+    }
+  }
+  if (!options.interface.empty()) return;
+  const bool hardware = options.timestamps == TimestampMode::kHardware;
+  // Software timestamps are CLOCK_REALTIME on every interface; this one is always there.
+  options.interface = hardware && properties ? std::string(properties->interface.view()) : "lo";
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/ptp_port.h"
+#include "ftcs/platform/local_socket.h"
+#include "ftcs/ptp/monitor_source.h"
+
+namespace ftcs::app {
+
+/// A clock that follows what another time receiver on this machine measures: timestamps come from
+/// the slave_event_monitor socket of ptp4l, which need not steer anything itself (free_running).
+class MonitorReceiver final : public PtpPort, private Managed {
+ public:
+  MonitorReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+                  std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
+                  RealClock* real_clock);
+
+ private:
+  [[nodiscard]] std::optional<platform::OsError> open_source() override;
+  void wait_until(FreeRunningTime underlying) override;
+  void housekeeping(FreeRunningTime now) override;
+  [[nodiscard]] int finish() override;
+
+  [[nodiscard]] Managed* managed() override { return this; }
+  [[nodiscard]] ptp::ManagedPort managed_port() override;
+  [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
+
+  // There is no protocol of our own: nothing comes, nothing is due.
+  ptp::ActionList start(FreeRunningTime now) override;
+  ptp::ActionList on_event(std::span<const std::uint8_t>, FreeRunningTime,
+                           FreeRunningTime) override {
+    return {};
+  }
+  ptp::ActionList on_general(std::span<const std::uint8_t>, FreeRunningTime) override { return {}; }
+  ptp::ActionList on_sent(const ptp::EventId&, std::optional<FreeRunningTime>,
+                          FreeRunningTime) override {
+    return {};
+  }
+  ptp::ActionList on_timer(FreeRunningTime) override { return {}; }
+  ptp::ActionList on_link_change(bool, FreeRunningTime) override { return {}; }
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const override { return std::nullopt; }
+  void act(const ptp::Action&) override {}
+
+  void read_reports();
+  void ask_for_timescale(FreeRunningTime now);
+  void on_sample(const ptp::MonitorSource::Event& event);
+  void watch_for_silence(FreeRunningTime now);
+  void log_lock();
+  [[nodiscard]] ptp::PortState state() const;
+
+  PortFacts facts_;
+  std::optional<platform::LocalSocket> socket_{};
+  ptp::MonitorSource source_;
+  ClockFollower follower_;
+  FreeRunningTime last_report_{};
+  FreeRunningTime next_question_{};
+  bool silent_ = false;          ///< said so
+  bool delays_missing_ = false;  ///< said so
+  bool was_locked_ = false;
+};
+
+/// Asks ptp4l, where it can be reached, which clock its timestamps are readings of, and completes
+/// the options by that: interface and kind of timestamps, where the user did not say.
+void complete_by_ptp4l(PtpOptions& options, Log& log);
+
+}  // namespace ftcs::app

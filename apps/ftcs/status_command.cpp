@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/management_server.h"
+#include "apps/ftcs/status_report.h"
+
+namespace ftcs::app {
+namespace {
+
+struct StatusArguments {
+  std::string socket;
+  bool json = false;
+};
+
+std::span<const std::uint8_t> octets(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+struct Answer {
+  std::string json;
+  StatusForPeople for_people;
+};
+
+/// The answer, or what is wrong.
+Result<Answer, std::string> ask(const std::string& path) {
+  constexpr int kPatienceMs = 2000;
+  auto client = platform::LocalSocket::client();
+  if (!client) return client.error().message();
+  if (const auto error = client->send(path, octets(kStatusQuery))) return error->message();
+  client->wait(kPatienceMs);
+  const auto answer = client->receive();
+  if (!answer) {
+    return fmt::format("socket {}: no answer within {} s; is that ftcs?", path, kPatienceMs / 1000);
+  }
+  std::string json(answer->bytes.begin(), answer->bytes.end());
+  auto status = read_status(json);
+  if (!status) return fmt::format("socket {}: the answer is no status of ftcs", path);
+  return Answer{std::move(json), std::move(*status)};
+}
+
+/// The first of the usual places where somebody answers.
+Result<Answer, std::string> ask_somebody(const std::string& given) {
+  if (!given.empty()) return ask(given);
+  std::string tried;
+  for (const std::string& path : platform::usual_socket_paths(kSocketName)) {
+    auto answer = ask(path);
+    if (answer) return answer;
+    tried += fmt::format("{}{}", tried.empty() ? "" : "; ", answer.error());
+  }
+  return fmt::format("no running instance found ({}); -s names its socket", tried);
+}
+
+int run(const StatusArguments& arguments) {
+  const auto answer = ask_somebody(arguments.socket);
+  if (!answer) {
+    fmt::print(stderr, "ftcs status: {}\n", answer.error());
+    return kRuntimeError;
+  }
+  fmt::print("{}", arguments.json ? answer->json : answer->for_people.text);
+  return answer->for_people.exit_code;
+}
+
+}  // namespace
+
+void add_status_command(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("status", "what a running ftcs ptp does (over its socket)");
+  const auto arguments = std::make_shared<StatusArguments>();
+  command
+      ->add_option("-s,--uds_address", arguments->socket,
+                   "the instance's socket; default: /var/run/ftcs or $XDG_RUNTIME_DIR/ftcs")
+      ->type_name("PATH");
+  command->add_flag("--json", arguments->json, "the whole status as one JSON object");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,109 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# Debian's ptp4l, free_running, reports its timestamps through slave_event_monitor; `ftcs ptp --source ptp4l` locks a
+# clock to them (1 ms away, 50 ppm fast). ptp4l is started anew, ftcs is started anew, broken reports are counted. With a
+# third argument (monitor_trial) the same reports go to the adaptive servo and to linuxptp-pi, each on a clock of its own:
+# the true RMS of the adaptive servo must be the lower one.
+#
+# test/interop/beside_ptp4l.sh [build/ftcs] [SECONDS] [build/bin/monitor_trial]
+. "$(dirname "$0")/common.sh"
+ftcs=$(realpath "${1:-build/ftcs}")
+duration=${2:-12}
+trial=${3:-}
+require ip ptp4l pmc python3
+make_network
+start_ptp4l transmitter "logSyncInterval -3" "logMinDelayReqInterval -3"
+
+receiver() {  # ptp4l on our side, which measures and steers nothing
+  printf '%s\n' "[global]" "free_running 1" "time_stamping software" "tx_timestamp_timeout 50" "slaveOnly 1" \
+    "logAnnounceInterval -1" "logMinDelayReqInterval -3" "uds_address $folder/ptp4l.uds" \
+    "slave_event_monitor $folder/monitor" > "$folder/ptp4l.conf"
+  ip netns exec "$ours" ptp4l -f "$folder/ptp4l.conf" -i "$our_interface" -m -q >> "$folder/ptp4l.log" 2>&1 &
+  ptp4l=$!
+  pids+=("$ptp4l")
+}
+follow() {  # in the background: the process becomes the program
+  exec "$ftcs" ptp --source ptp4l --slave_event_monitor "$folder/monitor" --ptp4l-socket "$folder/ptp4l.uds" \
+    --uds_address "$folder/ftcs.uds" --offset 1ms --skew 50ppm "$@"
+}
+status() { "$ftcs" status -s "$folder/ftcs.uds" "$@"; }
+wait_for_lock() {
+  local i
+  for i in $(seq 150); do
+    status > "$folder/status.txt" 2>&1 && return
+    sleep 0.1
+  done
+  fail "not locked within 15 s: $1"
+}
+field() { status --json | python3 -c "import json,sys; print(json.load(sys.stdin)$1)"; }
+
+# Nobody reports: ftcs says what to look at, and is not locked.
+if [ "$duration" -ge 20 ]; then
+  follow --duration 11 > "$folder/alone.log" 2>&1 &
+  code=0
+  wait $! || code=$?
+  [ "$code" -eq 3 ] || fail "without ptp4l: exit code $code, expected 3"
+  grep -q "slave_event_monitor $folder/monitor.*free_running 1" "$folder/alone.log" || fail "no hint what to set"
+fi
+
+receiver
+follow > "$folder/follow.log" 2>&1 &
+follower=$!
+pids+=("$follower")
+wait_for_lock "at the start"
+pmc -u -b 0 -s "$folder/ftcs.uds" -i "$folder/pmc.uds" "GET PARENT_DATA_SET" > "$folder/pmc.txt" 2>&1
+their_identity=$(sed -n 's/^ptp4l.*selected local clock \(.*\) as best master/\1/p' "$folder/transmitter.log")
+grep -q "grandmasterIdentity *$their_identity" "$folder/pmc.txt" || fail "pmc does not see the grandmaster $their_identity"
+
+# What is no report is counted and does no harm.
+python3 - "$folder/monitor" << 'END'
+import socket, sys
+s = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+sync = bytes.fromhex("0c02005c" + "00" * 40 + "8004002c" + "00" * 44)
+for broken in (b"", b"x" * 1000, sync[:60], sync[:47] + b"\x2a" + sync[48:], b"\x0d" + sync[1:]):
+    s.sendto(broken, sys.argv[1])
+END
+sleep 1
+[ "$(field "['messages']['malformed']")" -eq 5 ] || fail "broken reports: $(field "['messages']")"
+
+# ptp4l starts anew: its sequence begins at zero.
+syncs=$(field "['messages']['syncs']")
+kill "$ptp4l"; wait "$ptp4l" 2> /dev/null || true
+receiver
+sleep 1
+for _ in $(seq 100); do
+  [ "$(field "['messages']['syncs']")" -gt $((syncs + 12)) ] && break
+  sleep 0.1
+done
+[ "$(field "['messages']['syncs']")" -gt $((syncs + 12)) ] || fail "no samples after ptp4l started anew"
+wait_for_lock "after ptp4l started anew"
+offset=$(field "['offset_ns']")
+python3 -c "import sys; sys.exit(not abs($offset) < 100e3)" || fail "offset $offset ns after ptp4l started anew"
+
+# ftcs starts anew: ptp4l finds the new socket.
+kill -INT "$follower"
+wait "$follower" || fail "the first follower's exit code is $?"
+follow --duration "$duration" --json > "$folder/samples.json" 2> "$folder/again.log" &
+follower=$!
+pids+=("$follower")
+wait_for_lock "after ftcs started anew"
+wait "$follower" || fail "the second follower's exit code is $?: not locked"
+samples=$(wc -l < "$folder/samples.json")
+[ "$samples" -ge $(((duration - 2) * 8 * 8 / 10)) ] || fail "only $samples samples in $duration s"
+kill -0 "$ptp4l" || fail "ptp4l ended"
+grep -vE "rms|master offset" "$folder/follow.log"
+
+[ -z "$trial" ] && exit 0
+"$trial" "$folder/monitor" $((duration * 2)) > "$folder/trial.json" || fail "monitor_trial"
+cat "$folder/trial.json"
+python3 - "$folder/trial.json" << 'END' || fail "the adaptive servo is not the better one"
+import json, sys
+trial = json.load(open(sys.argv[1]))
+if abs(trial["realtime_drift_ns"]) > 200:
+    print("CLOCK_REALTIME was steered by", trial["realtime_drift_ns"], "ns: nothing can be said")
+    sys.exit(0)
+servos = {servo["servo"]: servo for servo in trial["servos"]}
+ours, pi = servos["adaptive"], servos["linuxptp-pi"]
+print(f"true RMS: adaptive {ours['true_error_rms_ns']} ns, linuxptp-pi {pi['true_error_rms_ns']} ns")
+sys.exit(not (ours["locked"] and ours["true_error_rms_ns"] < pi["true_error_rms_ns"]))
+END

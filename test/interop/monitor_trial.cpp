@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+//
+// Several servos on the samples that one running ptp4l reports to its slave_event_monitor, each on
+// a virtual clock of its own, judged by the truth: transmitter and receiver stand on one machine
+// and take software timestamps, so that the reference is CLOCK_REALTIME itself. The clocks start
+// 100 us away on an oscillator that is 20 ppm fast; nobody may step.
+//
+// monitor_trial SOCKET SECONDS: one JSON object on standard output.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/ftcs/servo_trial.h"
+#include "ftcs/clock/skewed_source.h"
+#include "ftcs/platform/kernel.h"
+#include "ftcs/platform/local_socket.h"
+#include "ftcs/platform/timestamp_clock.h"
+#include "ftcs/ptp/monitor_source.h"
+
+namespace {
+
+using namespace ftcs;
+using platform::TimestampClock;
+
+constexpr Duration kOffset{Nanoseconds{100'000}};
+constexpr double kSkewPpb = 20'000.0;
+constexpr double kLockBandNs = 20'000.0;
+
+double drift_ns(const TimestampClock::RealtimeReading& a,
+                const TimestampClock::RealtimeReading& b) {
+  return static_cast<double>(b.realtime_ns - a.realtime_ns) -
+         (b.free_running - a.free_running).ns();
+}
+
+class Trials {
+ public:
+  Trials(SkewedSource& source, const TimestampClock::RealtimeReading& start) : source_(source) {
+    VirtualClockConfig clock;
+    clock.free_running = start.free_running;
+    clock.local = LocalTime::from_ns(start.realtime_ns) + kOffset;
+    const app::TrueReference truth{Duration::from_whole_ns(start.realtime_ns) -
+                                   start.free_running.since_epoch()};
+    for (const ServoKind kind : {ServoKind::kAdaptive, ServoKind::kFtcs, ServoKind::kLinuxptpPi}) {
+      DisciplineConfig discipline;
+      discipline.servo.kind = kind;
+      discipline.servo.linuxptp_pi.first_step_threshold = Nanoseconds{0};
+      trials_.push_back(std::make_unique<app::ServoTrial>(
+          app::ServoTrial::Setup{std::string(servo_kind_name(kind)), discipline, clock, truth},
+          source));
+    }
+  }
+  void on_pair(const EventPair& pair) {
+    for (const auto& trial : trials_) trial->on_pair(pair);
+  }
+  void print(std::uint64_t syncs, double drift) const {
+    std::printf("{\"syncs\": %llu, \"realtime_drift_ns\": %.1f, \"servos\": [",
+                static_cast<unsigned long long>(syncs), drift);
+    for (std::size_t i = 0; i < trials_.size(); ++i) {
+      const app::TrialResult result = trials_[i]->result(kLockBandNs);
+      std::printf(
+          "%s{\"servo\": \"%s\", \"locked\": %s, \"cycles_to_lock\": %lld, "
+          "\"true_error_rms_ns\": %.1f, \"perceived_rms_ns\": %.1f, \"rejected\": %llu}",
+          i == 0 ? "" : ", ", result.servo.c_str(), result.locked ? "true" : "false",
+          result.cycles_to_lock ? static_cast<long long>(*result.cycles_to_lock) : -1LL,
+          second_half_rms(*trials_[i]), result.rms_perceived_offset_ns,
+          static_cast<unsigned long long>(result.rejected));
+    }
+    std::printf("]}\n");
+  }
+
+ private:
+  /// Of the second half, so that every servo has had the same time to settle.
+  static double second_half_rms(const app::ServoTrial& trial) {
+    const std::vector<double>& offsets = trial.true_offsets_ns();
+    double sum = 0.0;
+    const std::size_t first = offsets.size() / 2;
+    for (std::size_t i = first; i < offsets.size(); ++i) sum += offsets[i] * offsets[i];
+    return std::sqrt(sum / static_cast<double>(offsets.size() - first));
+  }
+
+  SkewedSource& source_;
+  std::vector<std::unique_ptr<app::ServoTrial>> trials_;
+};
+
+int run(const std::string& path, double seconds) {
+  platform::LinuxKernel kernel;
+  TimestampClock timestamps(kernel, platform::TimestampMode::kSoftware, std::nullopt);
+  auto socket = platform::LocalSocket::bind(path);
+  if (!socket) {
+    std::fprintf(stderr, "monitor_trial: %s\n", socket.error().message().c_str());
+    return 1;
+  }
+  const auto start = timestamps.read_realtime();
+  SkewedSource source(timestamps.source(), Rate::from_ppb(kSkewPpb), start.free_running);
+  Trials trials(source, start);
+  ptp::MonitorSource reports;
+  const FreeRunningTime end = timestamps.source().now() + Duration::from_ns(seconds * 1e9);
+  while (timestamps.source().now() < end) {
+    socket->wait(100);
+    while (const auto datagram = socket->receive()) {
+      for (const auto& event : reports.on_datagram(datagram->bytes)) {
+        const auto stamp = timestamps.convert({event.sample.local_ns, 0});
+        if (!stamp) continue;
+        trials.on_pair(
+            {event.sample.direction, event.sample.reference, source.from_underlying(stamp->time)});
+      }
+    }
+  }
+  trials.print(reports.counters().syncs, drift_ns(start, timestamps.read_realtime()));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: monitor_trial SOCKET SECONDS\n");
+    return 2;
+  }
+  return run(argv[1], std::atof(argv[2]));
+}
