@@ -1,6 +1,6 @@
 # The picture in README: how four servos start and settle, from the trace of one simulated run.
 #   build/ftcs simulate experiments/peers/020-g100-1s-never-step.toml --seeds 1 --trace trace.csv -q
-#   gnuplot -e "trace='trace.csv'" docs/pictures/lock.gp > docs/pictures/lock.svg
+#   gnuplot -e "trace='trace.csv'" docs/figures/lock.gp > docs/figures/lock.svg
 set terminal svg size 860,360 font "sans-serif,13" background "#ffffff"
 set datafile separator ','
 set logscale y
