@@ -18,7 +18,7 @@ ip netns exec "$theirs" "$ftcs" ptp -i "$their_interface" -S --role time-transmi
 pids+=($!)
 
 cat > "$folder/chrony.conf" << END
-refclock SOCK $folder/chrony.sock refid SOCK poll 0 filter 8 precision 1e-6
+refclock SOCK $folder/chrony.sock refid SOCK poll 0 filter 8 precision 1e-6 prefer
 refclock SHM 7 refid SHM7 poll 0 filter 8
 cmdport 0
 port 0
@@ -27,7 +27,6 @@ pidfile $folder/chronyd.pid
 logdir $folder
 log refclocks tracking
 END
-chmod 755 "$folder"
 # Both in one IPC namespace of their own: the segment goes with it.
 cat > "$folder/both.sh" << END
 chronyd -x -d -u root -f "$folder/chrony.conf" > "$folder/chronyd.log" 2>&1 &
@@ -47,19 +46,19 @@ for _ in $(seq $((duration * 5))); do
   reached && break
   sleep 0.2
 done
-ask sources
-ask tracking | tee "$folder/tracking.log"
-ask -c sources > "$folder/sources.csv"
+ask sources || true
+ask tracking > "$folder/tracking.out" || true
+ask -c sources > "$folder/sources.csv" || true
 reached || fail "reach is not 377"
 "$ftcs" status -s "$folder/ftcs.uds" --json > "$folder/status.json" || fail "ftcs status: exit code $?"
-grep -E "^(SOCK|SHM7)|:[0-9. ]*SOCK|SHM7|SOCK" "$folder/refclocks.log" | tail -4
+cat "$folder/tracking.out"
 
 python3 - "$folder" << 'END' || fail "what chronyd makes of the samples"
 import csv, json, statistics, sys
 folder = sys.argv[1]
 sources = {row[2]: row for row in csv.reader(open(f"{folder}/sources.csv"))}
 assert set(sources) == {"SOCK", "SHM7"}, sources
-assert "*" in (sources["SOCK"][1], sources["SHM7"][1]), "no source is selected"
+assert sources["SOCK"][1] == "*", "SOCK is not selected"
 raw = {"SOCK": [], "SHM7": []}
 for line in open(f"{folder}/refclocks.log"):
     fields = line.split()
@@ -71,13 +70,15 @@ for name, offsets in raw.items():
     middle = statistics.median(settled)
     print(f"{name}: {len(offsets)} samples, median raw offset {middle * 1e6:.1f} us, "
           f"spread {statistics.pstdev(settled) * 1e6:.2f} us")
-    assert len(offsets) > 40, "samples are missing"
+    # Each Sync is a sample for SOCK; chronyd looks into the shared memory once a second.
+    assert len(offsets) >= (40 if name == "SOCK" else 6), "samples are missing"
     # chrony's refclocks log: positive, the system clock is slow.
     assert abs(middle - 3e-3) < 100e-6, f"{name}: {middle}"
-tracking = dict(line.split(" : ") if " : " in line else (line, "") for line in
-                (l.strip() for l in open(f"{folder}/tracking.log")))
+tracking = dict(line.split(" : ", 1) for line in open(f"{folder}/tracking.out") if " : " in line)
 reference = next(value for key, value in tracking.items() if key.startswith("Reference ID"))
-assert "SOCK" in reference or "SHM7" in reference, reference
+assert "SOCK" in reference, reference
+system = next(value for key, value in tracking.items() if key.startswith("System time"))
+assert "slow" in system and abs(float(system.split()[0]) - 3e-3) < 100e-6, system
 leap = next(value for key, value in tracking.items() if key.startswith("Leap status"))
 assert leap.strip() == "Normal", leap
 END
