@@ -19,6 +19,8 @@ constexpr Nanoseconds kCycle{2'000'000};
 constexpr std::uint32_t kCyclesPerSync = 250;  // 500 ms
 /// Stamps are the kernel's at both ends, so that a late or slow frame still tells the phase.
 constexpr Nanoseconds kGate{500'000};
+/// The segment is a thread of a shared machine, which may stand still for a while.
+constexpr std::uint32_t kLostFrames = 250;
 /// Some hundreds let the clocks converge; the rest happens while the cycle runs.
 constexpr std::uint32_t kDriftPulses = 3000;
 
@@ -31,6 +33,7 @@ RunOptions run_options(const EthercatDemoOptions& demo, std::uint16_t port) {
   options.servo.largest_lateness = options.servo.largest_round_trip = kGate;
   options.drift_pulses = kDriftPulses;
   options.duration_s = demo.seconds_per_servo;
+  options.lost_frame_limit = kLostFrames;
   options.quiet = !demo.live_view;
   options.trace = true;
   return options;

@@ -107,6 +107,21 @@ INSTANTIATE_TEST_SUITE_P(Encapsulation, Tshark, ::testing::Values(false, true),
                            return parameter.param ? "udp" : "ethernet";
                          });
 
+/// Every frame of the bench, both directions, as this encapsulation has it.
+void record(test::MainBench& bench, Capture& capture, bool udp) {
+  bench.capture = [&capture, udp](LocalTime time, ConstBytes frame) {
+    if (udp) {
+      capture.add(time, in_udp(frame));
+      return;
+    }
+    std::array<std::uint8_t, kMaxEthernetSize> buffer{};
+    const auto ethernet = encode_ethernet(buffer, {0x02, 0x46, 0x54, 0x43, 0x53, 1}, frame);
+    ASSERT_TRUE(ethernet);
+    if (capture.count() % 2 == 1) mark_returned(buffer);
+    capture.add(time, *ethernet);
+  };
+}
+
 TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
   constexpr Nanoseconds kCycle{1'000'000};
   static constexpr auto kObjects = csp_objects(kCycle);
@@ -118,18 +133,7 @@ TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
   test::MainBench bench(config);
   bench.add_line(2, Nanoseconds{50});
   Capture capture;
-  const bool udp = GetParam();
-  bench.capture = [&](LocalTime time, ConstBytes frame) {
-    if (udp) {
-      capture.add(time, in_udp(frame));
-      return;
-    }
-    std::array<std::uint8_t, kMaxEthernetSize> buffer{};
-    const auto ethernet = encode_ethernet(buffer, {0x02, 0x46, 0x54, 0x43, 0x53, 1}, frame);
-    ASSERT_TRUE(ethernet);
-    if (capture.count() % 2 == 1) mark_returned(buffer);
-    capture.add(time, *ethernet);
-  };
+  record(bench, capture, GetParam());
   bench.bring_up();
   ASSERT_TRUE(bench.main().cyclic());
   bench.run(150);
@@ -145,6 +149,30 @@ TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
   const auto replies =
       capture.tshark("-Y 'ecat.sub2.cmd == 0x0c && ecat.sub2.cnt == 6' -T fields -e frame.number");
   EXPECT_EQ(replies.size(), 200U) << "working counter of two drives, as the dissector counts it";
+}
+
+TEST_P(Tshark, reads_the_way_back_of_a_restarted_drive_without_an_error) {
+  constexpr Nanoseconds kCycle{1'000'000};
+  static constexpr auto kObjects = csp_objects(kCycle);
+  MainDeviceConfig config;
+  config.clocks.drift_pulses = 5;
+  config.process.objects = kObjects;
+  config.process.cycle = kCycle;
+  config.process.sync0_shift = Nanoseconds{500'000};
+  test::MainBench bench(config);
+  bench.add_line(2, Nanoseconds{50});
+  bench.bring_up();
+  ASSERT_TRUE(bench.main().cyclic());
+  bench.main().request_operational();
+  bench.run(300);
+  Capture capture;
+  record(bench, capture, GetParam());
+  bench.segment().power_cycle(1, bench.now());
+  bench.run(1000);
+  ASSERT_EQ(bench.main().counters().reintegrated, 1U);
+  EXPECT_TRUE(capture.tshark("-Y '_ws.malformed || _ws.expert.severity == error'").empty());
+  EXPECT_EQ(capture.tshark("-Y ecat").size(), capture.count());
+  EXPECT_FALSE(capture.tshark("-Y 'ecat_mailbox.coe.sdoidx == 0x1c12'").empty());
 }
 
 }  // namespace

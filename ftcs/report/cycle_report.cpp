@@ -69,7 +69,8 @@ Json contour_json(const std::vector<experiment::ContourRow>& rows) {
                      {"missed_sync0_windows", row.missed_windows},
                      {"sync0_windows", row.windows},
                      {"first_fault_s", number(row.first_fault_s)},
-                     {"host_stall_cycles", row.host_stalls}});
+                     {"host_stall_cycles", row.host_stalls},
+                     {"ended", row.ended}});
   }
   return array;
 }
@@ -144,11 +145,12 @@ Table cycle_table(const CycleResult& result) {
 
 Table contour_table(const std::vector<experiment::ContourRow>& rows) {
   Table table({"servo", "contour error, RMS / um", "largest / um", "missed SYNC0 windows", "of",
-               "first fault of a drive / s", "host stalls / cycles"});
+               "first fault of a drive / s", "host stalls / cycles", "ended early"});
   for (const experiment::ContourRow& row : rows) {
     table.add_row({row.servo, Cell::significant(row.rms_um, 3), Cell::significant(row.max_um, 3),
                    Cell::count(row.missed_windows), Cell::count(row.windows),
-                   Cell::significant(row.first_fault_s, 3), Cell::count(row.host_stalls)});
+                   Cell::significant(row.first_fault_s, 3), Cell::count(row.host_stalls),
+                   row.ended});
   }
   return table;
 }

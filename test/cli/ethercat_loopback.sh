@@ -31,7 +31,7 @@ grep -q "no reply" "$folder/nobody" || fail "nobody there: no clear error"
 "$ftcs" ethercat run --cycle 3x > "$folder/usage" 2>&1
 [ $? -eq 2 ] || fail "wrong duration: expected exit code 2"
 
-"$ftcs" ethercat-segment --udp "$port" --drives 8 --json "$folder/segment.json" > "$folder/segment" 2>&1 &
+"$ftcs" ethercat-segment --udp "$port" --drives 8 --priority 70 --json "$folder/segment.json" > "$folder/segment" 2>&1 &
 segment=$!
 sleep 0.5
 "$ftcs" ethercat scan "${to[@]}" > "$folder/scan" 2>&1 || fail "scan"
@@ -47,6 +47,16 @@ grep -q "expected 9, found 8" "$folder/fewer" || fail "fewer drives: no clear er
 code=$?
 [ $code -eq 0 ] || [ $code -eq 3 ] || fail "run: exit code $code"
 grep -q '"op_cycle": [0-9]' "$folder/run.json" || fail "run: the drives did not reach OP"
+
+# A reference that runs 5 % too fast from the seventh second on is beyond what the cycle may be bent: a defined end.
+"$ftcs" ethercat-segment --udp $((port + 1)) --drives 2 --priority 70 --fault skew:0@5=50000 --duration 40 > "$folder/skewed" 2>&1 &
+skewed=$!
+sleep 0.3
+"$ftcs" ethercat run --udp "127.0.0.1:$((port + 1))" --drives 2 --servo adaptive --cycle 4ms --gate 2ms --drift-pulses 200 -q \
+  --unlocked-limit 1 --lost-frame-limit 1000 --duration 20 > "$folder/unlocked" 2>&1
+code=$?
+kill -INT "$skewed"
+[ $code -eq 1 ] && grep -q "cycle out of sync with the reference" "$folder/unlocked" || fail "lost sync: exit code $code, expected 1"
 kill -INT "$segment"
 wait "$segment" || fail "segment: exit code $?, expected 0 after SIGINT"
 segment=

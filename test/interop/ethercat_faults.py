@@ -63,6 +63,17 @@ def faults(cell):
     return [{fault["al_status_code"] for fault in drive["faults"]} for drive in cell["segment"]["drives"]]
 
 
+def ways_back(events):
+    """Seconds from the moment a drive was seen out of OP to its return."""
+    left, ways = {}, []
+    for event in events:
+        if event["event"] in ("left OP", "does not answer to its address"):
+            left.setdefault(event["drive"], event["time_s"])
+        if event["event"] == "back in OP" and event["drive"] in left:
+            ways.append(event["time_s"] - left.pop(event["drive"]))
+    return ways
+
+
 def judge(name, servo, cell, expected, may_miss):
     """expected: drive -> codes that must have been raised. may_miss: windows are missed by the nature of the fault, 0x001A may
     come of it."""
@@ -81,9 +92,9 @@ def judge(name, servo, cell, expected, may_miss):
     in_op = sum(drive["state"] == "OP" for drive in run["drives"])
     if "failure" not in run and in_op != 8:
         failed.append(f"{in_op} of 8 drives in OP at the end")
-    back = [event for event in run["events"] if event["event"] == "back in OP"]
-    left = [event for event in run["events"] if event["event"] in ("left OP", "does not answer to its address")]
-    way_back = f", drives back in OP {back[-1]['time_s'] - left[0]['time_s']:.2f} s after" if back and left else ""
+    way_back = ""
+    if ways := ways_back(run["events"]):
+        way_back = f", {len(ways)} returns to OP, each within {max(ways):.2f} s"
     print(f"{name}, {servo}: locked in cycle {run['lock_cycle']}, worst |phase| while locked {worst / 1000:.1f} us, lock lost "
           f"{run['lock_losses']} times, longest relock {run['longest_relock_cycles']} cycles, lost frames {run['lost_frames']}, "
           f"stalled cycles {run['host_stall_cycles']}, restarted drives back {run['reintegrated']}{way_back}"

@@ -18,6 +18,8 @@ constexpr double kOther_ppm = -80.0;
 constexpr double kSeconds = 12.0;
 constexpr Nanoseconds kGate{500'000};
 constexpr std::uint32_t kDriftPulses = 3000;
+/// The segment is a thread of a shared machine, which may stand still for a while.
+constexpr std::uint32_t kLostFrames = 500;
 
 struct Way {
   const char* title;
@@ -36,6 +38,7 @@ RunOptions options_for(const Way& way, std::uint16_t port) {
   options.radius = world.radius_um;
   options.turn_s = world.turn_s;
   options.contour = true;
+  options.lost_frame_limit = kLostFrames;
   options.sync_error_limit = 0;  // they shall go on, and be counted
   set_cycle_law(options, way.law);
   return options;
@@ -78,6 +81,7 @@ std::optional<std::vector<experiment::ContourRow>> run_live_contours(
     row.rms_um = runner.figures().contour.rms();
     row.max_um = runner.figures().contour.max_absolute();
     row.trace_um = runner.figures().contour_trace;
+    if (runner.main().failure()) row.ended = describe(runner.main().failure());
     row.host_stalls = runner.figures().host_stalls;
     for (std::size_t n = 0; n < kDrives; ++n) {
       const auto& sync = (*segment)->server().segment()[n].drive().statistics();

@@ -122,6 +122,10 @@ void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options
              options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
              got(setup.memory_locked), options.cpu >= 0 ? got(setup.pinned) : "not asked for",
              got(setup.latency_held));
+  if (options.spin > Nanoseconds{0}) {
+    fmt::print("the last {} us before each cycle keep a processor busy\n",
+               options.spin.count() / 1000);
+  }
 }
 
 int run_main(EthercatArguments arguments) {
@@ -210,6 +214,14 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
       .add_option("--sync-error-limit", options.sync_error_limit,
                   "0x10F1:02 of the drives: a missed SYNC0 window counts 3; default 17, 0 never")
       ->check(CLI::Range(0, 0xFFFF));
+  command
+      .add_option("--lost-frame-limit", options.lost_frame_limit,
+                  "so many frames in a row without an answer stop the drives; default 10")
+      ->check(CLI::Range(1, 1'000'000));
+  command
+      .add_option("--unlocked-limit", options.unlocked_limit_s,
+                  "seconds without the lock, once it was there, that stop the drives; default 10")
+      ->check(CLI::Range(0.1, 1e6));
   command
       .add_option("--ride-through", options.ride_through_s,
                   "seconds in which drives may be out of reach before the rest is stopped")

@@ -19,6 +19,8 @@ using platform::HostClock;
 
 /// A frame of the bring-up that is not back by then is lost.
 constexpr Nanoseconds kReplyTimeout{5'000'000};
+/// A segment in software may have to wait for its processor: half a second until nobody answers.
+constexpr std::uint32_t kRetries = 100;
 /// The part of a cycle in which its frame must be back.
 constexpr double kReplyShare = 0.8;
 /// Asking for OP again and again would only fill the frames.
@@ -34,6 +36,8 @@ ethercat::MainDeviceConfig make_config(const RunOptions& options, bool scan_only
                                        std::span<const ethercat::SdoDownload> objects) {
   ethercat::MainDeviceConfig config;
   config.expected_subdevices = options.drives;
+  config.retries = kRetries;
+  config.lost_frame_limit = options.lost_frame_limit;
   config.scan_only = scan_only;
   config.clocks.drift_pulses = scan_only ? 0 : options.drift_pulses;
   config.process.objects = objects;
@@ -118,6 +122,8 @@ void MainRunner::reserve_trace() {
 void MainRunner::run(const std::function<bool()>& stop) {
   axes_.resize(main_->network().count);
   reserve_trace();
+  unlocked_limit_ = static_cast<std::uint64_t>(options_.unlocked_limit_s * 1e9 /
+                                               static_cast<double>(options_.servo.cycle.count()));
   seen_.assign(main_->network().count, Seen::kNotYet);
   reintegrating_ = main_->network().count;
   start_ = HostClock::now();
@@ -265,6 +271,11 @@ void MainRunner::record(RunEvent::Kind kind, std::size_t drive, ethercat::AlStat
 
 void MainRunner::watch_lock() {
   const bool locked = decision_.state == CycleState::kLocked;
+  const bool followed = options_.servo.law != CycleLaw::kNone;
+  if (followed && lost_lock_at_ != 0 && !locked &&
+      figures_.cycles - lost_lock_at_ >= unlocked_limit_) {
+    main_->stop(ethercat::FailureKind::kSyncLost);
+  }
   if (locked == was_locked_) return;
   was_locked_ = locked;
   record(locked ? RunEvent::Kind::kLocked : RunEvent::Kind::kLockLost);

@@ -35,6 +35,10 @@ struct RunOptions {
   /// 0x10F1:02: a missed SYNC0 window counts three, a good one takes one off. Lost frames of a
   /// shared line shall not fault the drives: six misses in a row do.
   std::uint32_t sync_error_limit = 17;
+  /// Frames without an answer, in a row, before all drives are stopped.
+  std::uint32_t lost_frame_limit = 10;
+  /// So long the cycle may be without its lock, having had it, before all drives are stopped.
+  double unlocked_limit_s = 10.0;
   /// So long fewer drives than scanned may answer before the rest is stopped.
   double ride_through_s = 0.0;
   bool move = true;          ///< the axes draw circles, two by two
@@ -146,6 +150,7 @@ class MainRunner {
   std::vector<Seen> seen_;
   bool was_locked_ = false;
   std::uint64_t lost_lock_at_ = 0;
+  std::uint64_t unlocked_limit_ = 0;  ///< cycles
   std::uint32_t reintegrated_ = 0;
   std::size_t reintegrating_ = 0;
   double contour_group_ = 0.0;

@@ -41,6 +41,8 @@ const char* name(FailureKind kind) noexcept {
       return "clock does not follow the reference";
     case FailureKind::kWorkingCounter:
       return "working counter wrong";
+    case FailureKind::kSyncLost:
+      return "cycle out of sync with the reference";
     case FailureKind::kLinkLost:
       return "frames lost";
   }

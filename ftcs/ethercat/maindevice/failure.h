@@ -28,6 +28,7 @@ enum class FailureKind : std::uint8_t {
   kNoDistributedClock,    ///< nobody can be the reference
   kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received
+  kSyncLost,              ///< the cycle does not follow the reference any more
   kLinkLost,              ///< too many lost frames in a row
 };
 [[nodiscard]] const char* name(FailureKind kind) noexcept;

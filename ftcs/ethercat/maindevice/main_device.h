@@ -85,7 +85,8 @@ class MainDevice {
   void request_operational() noexcept;
   /// Acknowledge the error of one SubDevice and bring it back to what the others are in.
   void recover(std::size_t position) noexcept;
-  void stop() noexcept { begin_stop({}); }
+  /// All to SAFEOP, then nothing more.
+  void stop(FailureKind reason = FailureKind::kNone) noexcept { begin_stop({.kind = reason}); }
 
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   [[nodiscard]] bool cyclic() const noexcept { return stage_ == Stage::kCyclic; }
