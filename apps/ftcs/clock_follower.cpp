@@ -142,7 +142,7 @@ void ClockFollower::follow_lock(FreeRunningTime now) {
 
 void ClockFollower::note_refusal(const Telemetry& telemetry, double time_s,
                                  std::optional<double> offset_ns) {
-  status_.refusals.push_back({time_s, telemetry.verdict, offset_ns});
+  status_.refusals.push_back({time_s, telemetry.direction, telemetry.verdict, offset_ns});
   if (status_.refusals.size() > kKeptRefusals) status_.refusals.pop_front();
 }
 

@@ -45,6 +45,7 @@ class ClockFollower {
   /// A message that did not steer, and why.
   struct Refusal {
     double time_s = 0.0;
+    Direction direction = Direction::kForward;
     SampleVerdict verdict = SampleVerdict::kRejected;
     std::optional<double> offset_ns{};
   };

@@ -24,6 +24,9 @@ ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::
     port.description.physical_address.octets[i] = facts.address[i];
   }
   port.description.physical_address.size = std::tuple_size_v<decltype(facts.address)>;
+  // 7.4.1: 1 UDP/IPv4, 2 UDP/IPv6, 3 IEEE 802.3, in our order too.
+  port.description.network_protocol =
+      static_cast<std::uint16_t>(static_cast<int>(options.socket.transport) + 1);
   port.description.product = ptp::PtpText<64>(";;");
   port.description.revision = ptp::PtpText<32>(";;" FTCS_VERSION);
   port.description.profile = {0x00, 0x1B, 0x19, 0x00, 0x01, 0x00};  // default E2E, I.3

@@ -45,6 +45,7 @@ Json to_json(const std::deque<ClockFollower::Refusal>& refusals) {
   Json list = Json::array();
   for (const auto& refusal : refusals) {
     Json one{{"time_s", number(refusal.time_s)},
+             {"message", refusal.direction == Direction::kForward ? "Sync" : "Delay_Req"},
              {"verdict", verdict_name(refusal.verdict)},
              {"reason", reason(refusal.verdict)}};
     one["offset_ns"] = refusal.offset_ns ? number(*refusal.offset_ns) : Json();
@@ -105,9 +106,10 @@ void add_refusals(std::string& text, const Json& status) {
   const auto found = status.find("refusals");
   if (found == status.end() || !found->is_array()) return;
   for (const Json& one : *found) {
-    add_line(text, "  at",
-             fmt::format("{:.3f} s: {}, offset {}: {}", figure(one, "time_s"), word(one, "verdict"),
-                         time_text(one, "offset_ns"), word(one, "reason")));
+    add_line(
+        text, "  at",
+        fmt::format("{:.3f} s: {} {}, offset {}: {}", figure(one, "time_s"), word(one, "message"),
+                    word(one, "verdict"), time_text(one, "offset_ns"), word(one, "reason")));
   }
 }
 

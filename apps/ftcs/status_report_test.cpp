@@ -39,13 +39,13 @@ TEST(StatusReport, FieldsOfAnotherTypeAreNotKnown) {
 TEST(StatusReport, ShowsOffsetsAndRefusals) {
   const auto status = read_status(R"({"locked": true, "locked_for_s": 2.5, "offset_ns": -1500.0,
       "offset_sigma_ns": 20.0, "samples": {"used": 7, "rejected": 1, "steps": 0},
-      "refusals": [{"time_s": 2.0, "verdict": "rejected", "reason": "taken for an outlier",
+      "refusals": [{"time_s": 2.0, "message": "Sync", "verdict": "rejected", "reason": "taken for an outlier",
                     "offset_ns": 9000.0}]})");
   ASSERT_TRUE(status.has_value());
   for (const char* line :
        {"locked          yes, for 2.5 s\n", "offset          -1.500 us +/- 20.00 ns\n",
         "samples         used 7, rejected 1\n",
-        "  at            2.000 s: rejected, offset 9.000 us: taken for an outlier\n"}) {
+        "  at            2.000 s: Sync rejected, offset 9.000 us: taken for an outlier\n"}) {
     EXPECT_NE(status->text.find(line), std::string::npos) << line << status->text;
   }
 }
