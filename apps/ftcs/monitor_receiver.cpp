@@ -14,6 +14,9 @@ constexpr Duration kPatience{std::chrono::seconds{10}};
 // Two-way samples are rarer than Syncs.
 constexpr std::uint64_t kSyncsWithoutDelay = 32;
 constexpr int kReportsAtOnce = 64;
+// For an answer of ptp4l: before there is anything to steer, and while a clock is being steered.
+constexpr int kPatienceMs = 500;
+constexpr int kSoonMs = 30;
 
 /// What the ptp4l that serves this management socket says, if it answers.
 template <class Data>
@@ -70,6 +73,7 @@ void MonitorReceiver::wait_until(FreeRunningTime underlying) {
 
 void MonitorReceiver::housekeeping(FreeRunningTime now) {
   ask_for_timescale(now);
+  ask_for_link_delay(now);
   read_reports();
   follower_.on_silence();
   if (real_clock() != nullptr) {
@@ -89,13 +93,29 @@ void MonitorReceiver::ask_for_timescale(FreeRunningTime now) {
   const bool first = next_question_ == FreeRunningTime{};
   next_question_ = now + kInterval;
   const auto properties = ask_ptp4l<ptp::TimePropertiesDataSet>(
-      options(), ptp::ManagementId::kTimePropertiesDataSet, first ? 500 : 30);
+      options(), ptp::ManagementId::kTimePropertiesDataSet, first ? kPatienceMs : kSoonMs);
   if (properties) {
     set_scale(reference_scale(properties->flags, properties->utc_offset));
   } else if (first) {
     fail("ptp4l does not answer on " + options().ptp4l_socket +
          " (--ptp4l-socket), and nothing else says whether its reference shows TAI or UTC");
   }
+}
+
+// ptp4l does not report its peer delay messages, but it tells what they came to.
+void MonitorReceiver::ask_for_link_delay(FreeRunningTime now) {
+  constexpr Duration kInterval{std::chrono::seconds{1}};
+  if (!options().peer_to_peer() || source_.counters().syncs == 0 || now < next_link_question_) {
+    return;
+  }
+  next_link_question_ = now + kInterval;
+  const auto port =
+      ask_ptp4l<ptp::PortDataSet>(options(), ptp::ManagementId::kPortDataSet, kSoonMs);
+  if (!port || port->mean_link_delay <= Duration{}) return;  // none yet
+  const bool first = !std::exchange(link_delay_known_, true);
+  const auto wrong =
+      follower_.on_link_delay(port->mean_link_delay, first, now, source_.sync_interval());
+  if (wrong) fail(*wrong);
 }
 
 void MonitorReceiver::read_reports() {
@@ -140,10 +160,12 @@ void MonitorReceiver::watch_for_silence(FreeRunningTime now) {
   if (!silent && silent_) log()(LogLevel::kNotice, "ptp4l reports again");
   silent_ = silent;
   const ptp::MonitorCounters& counters = source_.counters();
-  if (!delays_missing_ && counters.delays == 0 && counters.syncs >= kSyncsWithoutDelay) {
+  if (!options().peer_to_peer() && !delays_missing_ && counters.delays == 0 &&
+      counters.syncs >= kSyncsWithoutDelay) {
     delays_missing_ = true;
     log()(LogLevel::kWarning,
-          "ptp4l reports Syncs but no delays: only 'delay_mechanism E2E' has them in its reports");
+          "ptp4l reports Syncs but no delays: if it measures peer to peer, say so (-P), or start "
+          "ftcs after it");
   }
 }
 
@@ -184,7 +206,7 @@ std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
 void complete_by_ptp4l(PtpOptions& options, Log& log) {
   using platform::TimestampMode;
   const auto properties =
-      ask_ptp4l<ptp::PortPropertiesNp>(options, ptp::ManagementId::kPortPropertiesNp, 500);
+      ask_ptp4l<ptp::PortPropertiesNp>(options, ptp::ManagementId::kPortPropertiesNp, kPatienceMs);
   if (options.timestamps == TimestampMode::kBestAvailable) {
     const bool hardware = properties && properties->timestamping != 0;
     options.timestamps = hardware ? TimestampMode::kHardware : TimestampMode::kSoftware;
@@ -194,6 +216,12 @@ void complete_by_ptp4l(PtpOptions& options, Log& log) {
           "for hardware)",
           options.ptp4l_socket);
     }
+  }
+  const auto port =
+      ask_ptp4l<ptp::PortDataSet>(options, ptp::ManagementId::kPortDataSet, kPatienceMs);
+  constexpr std::uint8_t kPeerToPeer = 2;
+  if (port && port->delay_mechanism == kPeerToPeer) {
+    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   }
   if (!options.interface.empty()) return;
   const bool hardware = options.timestamps == TimestampMode::kHardware;

@@ -48,6 +48,7 @@ class MonitorReceiver final : public PtpPort, private Managed {
 
   void read_reports();
   void ask_for_timescale(FreeRunningTime now);
+  void ask_for_link_delay(FreeRunningTime now);
   void on_sample(const ptp::MonitorSource::Event& event);
   void watch_for_silence(FreeRunningTime now);
   void log_lock();
@@ -59,13 +60,15 @@ class MonitorReceiver final : public PtpPort, private Managed {
   ClockFollower follower_;
   FreeRunningTime last_report_{};
   FreeRunningTime next_question_{};
+  FreeRunningTime next_link_question_{};
+  bool link_delay_known_ = false;
   bool silent_ = false;          ///< said so
   bool delays_missing_ = false;  ///< said so
   bool was_locked_ = false;
 };
 
-/// Asks ptp4l, where it can be reached, which clock its timestamps are readings of, and completes
-/// the options by that: interface and kind of timestamps, where the user did not say.
+/// Asks ptp4l, where it can be reached, which clock its timestamps are readings of and how it
+/// measures the delay, and completes the options by that where the user did not say.
 void complete_by_ptp4l(PtpOptions& options, Log& log);
 
 }  // namespace ftcs::app

@@ -5,6 +5,8 @@
 # third argument (monitor_trial) the same reports go to the adaptive servo and to linuxptp-pi, each on a clock of its own:
 # the true RMS of the adaptive servo must be the lower one.
 #
+# Below 20 SECONDS only the lock and the broken reports.
+#
 # test/interop/beside_ptp4l.sh [build/ftcs] [SECONDS] [build/bin/monitor_trial]
 . "$(dirname "$0")/common.sh"
 ftcs=$(realpath "${1:-build/ftcs}")
@@ -13,11 +15,12 @@ trial=${3:-}
 require ip ptp4l pmc python3
 make_network
 start_ptp4l transmitter "logSyncInterval -3" "logMinDelayReqInterval -3"
+their_ptp4l=${pids[-1]}
 
 receiver() {  # ptp4l on our side, which measures and steers nothing
   printf '%s\n' "[global]" "free_running 1" "time_stamping software" "tx_timestamp_timeout 50" "slaveOnly 1" \
     "logAnnounceInterval -1" "logMinDelayReqInterval -3" "uds_address $folder/ptp4l.uds" \
-    "slave_event_monitor $folder/monitor" > "$folder/ptp4l.conf"
+    "slave_event_monitor $folder/monitor" "$@" > "$folder/ptp4l.conf"
   ip netns exec "$ours" ptp4l -f "$folder/ptp4l.conf" -i "$our_interface" -m -q >> "$folder/ptp4l.log" 2>&1 &
   ptp4l=$!
   pids+=("$ptp4l")
@@ -66,6 +69,13 @@ END
 sleep 1
 [ "$(field "['messages']['malformed']")" -eq 5 ] || fail "broken reports: $(field "['messages']")"
 
+if [ "$duration" -lt 20 ]; then
+  kill -INT "$follower"
+  wait "$follower" || fail "the follower's exit code is $?: not locked"
+  grep -vE "rms|master offset" "$folder/follow.log"
+  exit 0
+fi
+
 # ptp4l starts anew: its sequence begins at zero.
 syncs=$(field "['messages']['syncs']")
 kill "$ptp4l"; wait "$ptp4l" 2> /dev/null || true
@@ -93,7 +103,26 @@ samples=$(wc -l < "$folder/samples.json")
 kill -0 "$ptp4l" || fail "ptp4l ended"
 grep -vE "rms|master offset" "$folder/follow.log"
 
+# Peer to peer: no delays in the reports, but ptp4l tells its link delay.
+kill "$ptp4l" "$their_ptp4l"; wait "$ptp4l" "$their_ptp4l" 2> /dev/null || true
+start_ptp4l transmitter_p2p "logSyncInterval -3" "logMinPdelayReqInterval -3" "delay_mechanism P2P"
+their_ptp4l=${pids[-1]}
+receiver "delay_mechanism P2P" "logMinPdelayReqInterval -3"
+sleep 1
+follow > "$folder/p2p.log" 2>&1 &
+follower=$!
+pids+=("$follower")
+wait_for_lock "peer to peer"
+delay=$(field "['path_delay_ns']")
+python3 -c "import sys; sys.exit(not 0 < $delay < 500e3)" || fail "peer to peer: path delay $delay ns"
+[ "$(field "['messages']['delays']")" -eq 0 ] || fail "peer to peer with delay requests"
+kill -INT "$follower"
+wait "$follower" || fail "peer to peer: exit code $?"
+kill "$ptp4l" "$their_ptp4l"; wait "$ptp4l" "$their_ptp4l" 2> /dev/null || true
+
 [ -z "$trial" ] && exit 0
+start_ptp4l transmitter_again "logSyncInterval -3" "logMinDelayReqInterval -3"
+receiver
 "$trial" "$folder/monitor" $((duration * 2)) > "$folder/trial.json" || fail "monitor_trial"
 cat "$folder/trial.json"
 python3 - "$folder/trial.json" << 'END' || fail "the adaptive servo is not the better one"
