@@ -100,6 +100,13 @@ static int bring_up(const char* interface) {
   return 1;
 }
 
+/* AL status of all SubDevices, OR-ed. (ecx_statecheck() sleeps for a millisecond: not in this loop.) */
+static uint16 all_states(void) {
+  uint16 status = 0;
+  ecx_BRD(&context.port, 0, ECT_REG_ALSTAT, sizeof status, &status, EC_TIMEOUTRET);
+  return etohs(status);
+}
+
 static int compare(const void* a, const void* b) {
   const int32_t left = *(const int32_t*)a, right = *(const int32_t*)b;
   return (left > right) - (left < right);
@@ -159,14 +166,14 @@ static int run(const ftcs_cycle_config* config, double seconds) {
       ecx_writestate(&context, 0);
     }
     if (cycle % 100 == 0) {
-      const uint16 state = ecx_statecheck(&context, 0, EC_STATE_OPERATIONAL, 0);
-      in_op = state == EC_STATE_OPERATIONAL;
+      const uint16 states = all_states();
+      in_op = states == EC_STATE_OPERATIONAL;
       if (in_op && op_at < 0) op_at = cycle;
       if (!in_op && op_at >= 0) {
         /* Some left OP: acknowledge first, ask again the next time. */
         ++recoveries;
         context.slavelist[0].state =
-            (state & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
+            (states & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
         ecx_writestate(&context, 0);
       }
     }
