@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "apps/ftcs/real_clock.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -34,8 +35,10 @@ std::string describe(const std::string& clock, ClockError error) {
 RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc)
     : kernel_(kernel), log_(log), clock_(std::move(clock)), timer_(kernel), utc_(std::move(utc)) {}
 
-void RealClock::before_wait() {
-  if (const auto wait = clock_.wait_for_expiry_ns()) timer_.set(*wait);
+void RealClock::before_wait(std::optional<std::int64_t> at_most_ns) {
+  std::optional<std::int64_t> wait = clock_.wait_for_expiry_ns();
+  if (at_most_ns) wait = std::min(wait.value_or(*at_most_ns), *at_most_ns);
+  if (wait) timer_.set(*wait);
 }
 
 void RealClock::on_wake() {

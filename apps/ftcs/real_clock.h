@@ -40,8 +40,8 @@ class RealClock {
 
   /// To be polled for reading, together with whatever the loop waits for.
   [[nodiscard]] int wake_descriptor() const { return timer_.descriptor(); }
-  /// Before each wait.
-  void before_wait();
+  /// Before each wait; it will be woken when a correction has to end, or after `at_most_ns`.
+  void before_wait(std::optional<std::int64_t> at_most_ns = std::nullopt);
   /// When wake_descriptor() can be read.
   void on_wake();
 

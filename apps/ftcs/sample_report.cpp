@@ -89,6 +89,15 @@ std::string ptp4l_line(const SampleRecord& record) {
   return line;
 }
 
+std::string phc2sys_line(const SampleRecord& record, const std::string& clock, const char* source) {
+  const Telemetry& t = record.telemetry;
+  std::string line = fmt::format("{} {} offset {:9d} s{} freq {:+7.0f} delay {:6d}", clock, source,
+                                 record.offset.rounded_ns(), ptp4l_state(t.servo.state),
+                                 ptp4l_frequency_ppb(t), t.servo.path_delay.rounded_ns());
+  if (t.verdict != SampleVerdict::kUsed) line.append(" ").append(verdict_name(t.verdict));
+  return line;
+}
+
 std::string json_line(const SampleRecord& record) {
   std::string line;
   for (const Field& field : fields(record)) {

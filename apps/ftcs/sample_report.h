@@ -26,6 +26,10 @@ struct SampleRecord {
 /// local clock was found to be: minus the adjustment that is applied, in ppb. A rejected sample has
 /// its verdict at the end.
 [[nodiscard]] std::string ptp4l_line(const SampleRecord& record);
+/// "CLOCK_REALTIME phc offset ... s2 freq ... delay ...", as phc2sys prints it; `source`: "phc" or
+/// "sys".
+[[nodiscard]] std::string phc2sys_line(const SampleRecord& record, const std::string& clock,
+                                       const char* source);
 /// One JSON object; docs/ptp.md lists the fields. What is not known is null.
 [[nodiscard]] std::string json_line(const SampleRecord& record);
 [[nodiscard]] std::string csv_header();

@@ -86,6 +86,17 @@ class FakeClocks final : public FakeKernel {
     timer_ns = ns;
     return 0;
   }
+  /// Waits for the timer, or for the timeout.
+  int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override {
+    const double timeout = static_cast<double>(timeout_ms) * 1e6;
+    const bool woken = timer_ns > 0 && static_cast<double>(timer_ns) <= timeout;
+    run(woken ? static_cast<double>(timer_ns) : timeout);
+    timer_ns = woken ? 0 : timer_ns - std::llround(timeout);
+    for (pollfd& entry : descriptors) entry.revents = woken ? POLLIN : 0;
+    if (on_poll) on_poll();
+    return woken ? 1 : 0;
+  }
+  std::function<void()> on_poll;
   int adjust_clock(clockid_t id, timex& request) noexcept override {
     Clock& clock = id == CLOCK_REALTIME ? system : phc;
     if (&clock == &phc && phc_gone) return -ENODEV;

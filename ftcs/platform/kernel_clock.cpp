@@ -35,6 +35,15 @@ SteeringHistory::Map starting_at(FreeRunningTime free, LocalTime local, Rate rat
   return {free, local, rate};
 }
 
+// A bracket that an interrupt has made wide says less: only what lies outside of it is believed.
+Duration beyond_bracket(Duration deviation, std::int64_t width_ns) noexcept {
+  constexpr double kUsualWidthNs = 1'000.0;
+  const double slack = std::max(0.0, (static_cast<double>(width_ns) - kUsualWidthNs) / 2.0);
+  if (slack == 0.0) return deviation;
+  const double ns = deviation.ns();
+  return Duration::from_ns(ns - std::clamp(ns, -slack, slack));
+}
+
 }  // namespace
 
 KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_steer)
@@ -79,11 +88,13 @@ std::optional<KernelClock::Faces> KernelClock::look() noexcept {
   if (std::abs(deviation.ns()) > allowed) {
     note_leap_or_step(deviation, *now, by_raw);
   } else if (system) {
-    history_.shift_newest(deviation);
-    learn_gain(deviation, elapsed_raw);
+    const Duration seen = beyond_bracket(deviation, now->width_ns);
+    history_.shift_newest(seen);
+    learn_gain(seen, elapsed_raw);
   }
   const LocalTime local = local_of(now->clock_ns);
-  latest_ = {system ? by_raw : history_.free_running_at(local), local};
+  latest_ = system ? ClockReading{by_raw, history_.local_at(by_raw)}
+                   : ClockReading{history_.free_running_at(local), local};
   latest_raw_ns_ = now->raw_ns;
   return Faces{latest_, now->raw_ns};
 }

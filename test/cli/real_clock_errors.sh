@@ -39,5 +39,22 @@ expect 1 "$folder/none.list: No such file" ptp -i lo --clock system --leapfile "
 printf '3550089600 35\n3550089600 36\n' > "$folder/wrong.list"
 expect 1 "$folder/wrong.list:2: not later than the line before" ptp -i lo --clock system --leapfile "$folder/wrong.list"
 
+expect 2 "no source: give one with -s" phc
+expect 2 "the time offset must be given" phc -s /dev/ptp0
+expect 2 "-O and --leapfile exclude each other" phc -s /dev/ptp0 -O 0 --leapfile x
+expect 2 "only where CLOCK_REALTIME is steered" phc -s CLOCK_REALTIME -c eth0 --leapfile x
+expect 2 "'linreg' is not supported" phc -s /dev/ptp0 -O 0 -E linreg
+expect 2 "-P and -I are of the pi servo" phc -s /dev/ptp0 -O 0 -P 1
+expect 2 "unknown servo 'magic'" phc -s /dev/ptp0 -O 0 --servo magic
+expect 2 "a PPS source is not supported" phc -d /dev/pps0
+expect 2 "-R: '0': expected a number" phc -R 0
+expect 2 "-N: '26': expected an integer from 1 to 25" phc -N 26
+expect 2 "-O: '0.5': expected an integer" phc -s /dev/ptp0 -O 0.5
+expect 1 "/dev/no-ptp: no such device" phc -s /dev/no-ptp -O 0
+expect 1 "/dev/null: not a PTP hardware clock" phc -s /dev/null -O 0
+expect 1 "interface nosuch0: no such device" phc -s nosuch0 -O -37
+expect 1 "interface lo: no PTP hardware clock" phc -s lo -O -37
+expect 1 "steering CLOCK_REALTIME: not permitted" phc -s CLOCK_REALTIME -O 0
+
 [ "$failures" -eq 0 ] && echo "all errors are as documented"
 exit "$failures"

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/number_check.h"
+#include "apps/ftcs/phc/phc_options.h"
+#include "apps/ftcs/phc/phc_runner.h"
+#include "apps/ftcs/ptp_arguments.h"
+#include "apps/ftcs/units.h"
+
+namespace ftcs::app {
+namespace {
+
+using Wrong = std::optional<std::string>;
+
+/// The command line as it was given.
+struct PhcArguments {
+  PhcOptions options;
+  std::string servo;
+  std::string law;  ///< -E
+  std::optional<double> proportional;
+  std::optional<double> integral;
+  std::optional<double> first_step_s;
+  std::optional<double> step_s;
+  std::string max_frequency;
+  std::optional<double> duration_s;
+  bool leap_by_us = false;
+};
+
+void refuse(CLI::App& command, const char* flag, const char* reason, bool takes_value) {
+  const auto fail = [flag, reason] { throw CLI::ValidationError(flag, reason); };
+  if (takes_value) {
+    command
+        .add_option_function<std::string>(
+            flag, [fail](const std::string&) { fail(); }, reason)
+        ->type_name("VALUE");
+  } else {
+    command.add_flag_callback(flag, fail, reason);
+  }
+}
+
+void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
+  PhcOptions& options = arguments.options;
+  command.add_option("-s", options.source, "source: /dev/ptpN, an interface or CLOCK_REALTIME")
+      ->type_name("CLOCK");
+  command.add_option("-c", options.sink, "what is steered, named likewise; default CLOCK_REALTIME")
+      ->type_name("CLOCK");
+  command.add_option("-O", options.sink_ahead_s, "steered clock minus source, in seconds")
+      ->type_name("SECONDS")
+      ->check(integer_from(-100'000, 100'000));
+  command
+      .add_option(
+          "--leapfile", options.leap_file,
+          "instead of -O: the source is TAI, the system clock UTC by this leap-seconds.list")
+      ->type_name("FILE");
+  command.add_flag("-x", arguments.leap_by_us,
+                   "leap seconds by stepping the clock instead of by the kernel");
+  command.add_flag("--free-running", options.free_running, "compare, steer nothing");
+}
+
+void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
+  command.add_option("--servo", arguments.servo, servo_names() + "; default adaptive")
+      ->type_name("NAME");
+  command.add_option("-E", arguments.law, "pi: as --servo linuxptp-pi")->type_name("NAME");
+  command.add_option("-P", arguments.proportional, "pi: proportional constant; default 0.7")
+      ->type_name("KP")
+      ->check(number_from(0.0, 1e6));
+  command.add_option("-I", arguments.integral, "pi: integral constant; default 0.3")
+      ->type_name("KI")
+      ->check(number_from(0.0, 1e6));
+  command
+      .add_option("-F", arguments.first_step_s,
+                  "step at the start above this; default 0.00002, 0: never")
+      ->type_name("SECONDS")
+      ->check(number_from(0.0, 1e9));
+  command.add_option("-S", arguments.step_s, "step at any time above this; default 0: never")
+      ->type_name("SECONDS")
+      ->check(number_from(0.0, 1e9));
+  command
+      .add_option("--max-frequency", arguments.max_frequency,
+                  "largest adjustment, for example 500ppm")
+      ->type_name("RATE");
+}
+
+void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
+  PhcOptions& options = arguments.options;
+  command.add_option("-R", options.rate_hz, "comparisons a second; default 1")
+      ->type_name("HZ")
+      ->check(number_from(1e-3, 1e3));
+  command
+      .add_option("-N", options.readings, "readings a comparison, the quickest counts; default 5")
+      ->type_name("N")
+      ->check(integer_from(1, 25));
+  command
+      .add_option("-u", options.samples_per_summary,
+                  "comparisons in a summary line; default 0: each")
+      ->type_name("N")
+      ->check(integer_from(0, 1'000'000));
+  command.add_option("-l", options.log_level, "log level, 0 to 7; default 6")
+      ->type_name("LEVEL")
+      ->check(integer_from(0, 7));
+  command.add_option("--duration", arguments.duration_s, "stop after so many seconds")
+      ->type_name("SECONDS")
+      ->check(number_from(0.001, 1e9));
+  command.add_flag_callback(
+      "-m", [] {}, "accepted: messages always go to standard output");
+  command.add_flag_callback(
+      "-q", [] {}, "accepted: messages never go to the system log");
+  command
+      .add_option_function<std::string>(
+          "-L", [](const std::string&) {},
+          "accepted: the clock is always watched for others' steering")
+      ->type_name("PPB")
+      ->check(number_from(0.0, 1e9));
+}
+
+void refuse_the_rest(CLI::App& command) {
+  constexpr const char* kNoPort =
+      "following a PTP port's state is not supported: give -s, -c and -O or --leapfile";
+  refuse(command, "-a", kNoPort, false);
+  refuse(command, "-r", kNoPort, false);
+  refuse(command, "-w", kNoPort, false);
+  refuse(command, "-n", kNoPort, true);
+  refuse(command, "-z", kNoPort, true);
+  refuse(command, "-d", "a PPS source is not supported", true);
+  refuse(command, "-f", "a configuration file is not supported", true);
+  refuse(command, "-t", "a message tag is not supported", true);
+  refuse(command, "-M", "an NTP SHM segment is not supported", true);
+}
+
+Wrong apply_servo(const PhcArguments& arguments, PhcOptions& options) {
+  ServoConfig& servo = options.servo;
+  if (!arguments.law.empty()) {
+    if (arguments.law != "pi") {
+      return fmt::format("-E: '{}' is not supported, only pi (--servo knows more)", arguments.law);
+    }
+    servo.kind = ServoKind::kLinuxptpPi;
+  }
+  if (!arguments.servo.empty()) {
+    if (!arguments.law.empty()) return "-E and --servo exclude each other";
+    const auto kind = servo_kind_from_name(arguments.servo);
+    if (!kind) {
+      return fmt::format("--servo: unknown servo '{}' (known: {})", arguments.servo, servo_names());
+    }
+    servo.kind = *kind;
+  }
+  if ((arguments.proportional || arguments.integral) && servo.kind != ServoKind::kLinuxptpPi) {
+    return "-P and -I are of the pi servo: -E pi";
+  }
+  if (arguments.proportional) servo.linuxptp_pi.proportional_const = *arguments.proportional;
+  if (arguments.integral) servo.linuxptp_pi.integral_const = *arguments.integral;
+  if (options.free_running) servo.kind = ServoKind::kFreeRunning;
+  if (!arguments.max_frequency.empty()) {
+    const auto ppb = parse_ppb(arguments.max_frequency);
+    if (!ppb) return "--max-frequency: " + ppb.error().message;
+    if (*ppb <= 0.0) return "--max-frequency: must be greater than zero";
+    servo.limits = RateLimits::symmetric_ppb(*ppb);
+  }
+  if (const auto error = validate(servo)) return std::string(describe(*error));
+  return std::nullopt;
+}
+
+Wrong apply_offset(PhcOptions& options) {
+  const bool from_system = options.source == "CLOCK_REALTIME";
+  const bool to_system = options.sink == "CLOCK_REALTIME";
+  if (options.sink_ahead_s) {
+    if (!options.leap_file.empty()) return "-O and --leapfile exclude each other";
+    return std::nullopt;
+  }
+  if (!from_system && !to_system) {
+    options.sink_ahead_s = 0;  // two hardware clocks keep the same timescale
+  } else if (options.leap_file.empty()) {
+    return "the time offset must be given: -O SECONDS (steered clock minus source) or --leapfile "
+           "FILE";
+  } else if (!to_system) {
+    return "--leapfile: only where CLOCK_REALTIME is steered; give -O";
+  }
+  return std::nullopt;
+}
+
+Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
+  const auto nanoseconds = [](double seconds) {
+    return Nanoseconds{Duration::from_ns(seconds * 1e9).rounded_ns()};
+  };
+  if (options.source.empty()) return "no source: give one with -s, for example -s eth0";
+  if (arguments.first_step_s) options.first_step_threshold = nanoseconds(*arguments.first_step_s);
+  if (arguments.step_s) options.step_threshold = nanoseconds(*arguments.step_s);
+  if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
+  options.kernel_leap = !arguments.leap_by_us;
+  if (auto wrong = apply_offset(options)) return wrong;
+  return apply_servo(arguments, options);
+}
+
+int run(const PhcOptions& options) {
+  platform::LinuxKernel kernel;
+  Log log(kernel, stdout, options.log_level);
+  auto runner = PhcRunner::open(kernel, options, log);
+  if (!runner) {
+    log(LogLevel::kError, "{}", runner.error());
+    return kRuntimeError;
+  }
+  return (*runner)->run();
+}
+
+}  // namespace
+
+void add_phc_command(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("phc", "a clock of this machine follows another one (flags as phc2sys's)");
+  command->set_help_flag("-h,--help", "print this help and exit");
+  command->set_version_flag("-v,--version", "ftcs " FTCS_VERSION, "print the version and exit");
+  const auto arguments = std::make_shared<PhcArguments>();
+  add_clock_flags(*command, *arguments);
+  add_servo_flags(*command, *arguments);
+  add_reading_flags(*command, *arguments);
+  refuse_the_rest(*command);
+  command->callback([arguments, &exit_code] {
+    PhcOptions options = arguments->options;
+    if (const auto wrong = complete(*arguments, options)) {
+      fmt::print(stderr, "ftcs phc: {}\n", *wrong);
+      exit_code = kUsageError;
+      return;
+    }
+    exit_code = run(options);
+  });
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/ftcs/log.h"
+#include "apps/ftcs/phc/clock_comparison.h"
+#include "apps/ftcs/phc/phc_options.h"
+#include "apps/ftcs/real_clock.h"
+#include "apps/ftcs/sample_report.h"
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/platform/clock_device.h"
+
+namespace ftcs::app {
+
+/// "CLOCK_REALTIME", "/dev/ptp0", or the hardware clock of a network interface.
+[[nodiscard]] Result<platform::ClockDevice, platform::OsError> open_clock(
+    platform::Kernel& kernel, const std::string& name, platform::ClockAccess access);
+
+/// One clock of the kernel that follows another of the same machine.
+///
+/// Each comparison is a two-way exchange: the reading before the source was latched and the one
+/// after it bound the instant from both sides, and what either took longer than usual is delay, as
+/// a packet's. So a slow reading counts for less by itself, and for nothing as an outlier.
+class PhcRunner {
+ public:
+  /// Opens what the options name. The error is one line for the user; no clock has been touched.
+  [[nodiscard]] static Result<std::unique_ptr<PhcRunner>, std::string> open(
+      platform::Kernel& kernel, const PhcOptions& options, Log& log);
+
+  /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
+  [[nodiscard]] int run();
+
+ private:
+  struct Clocks {
+    platform::ClockDevice source;
+    std::unique_ptr<RealClock> sink;
+    ClockComparison comparison;
+  };
+  PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
+
+  void wait();
+  void take_sample();
+  void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
+  void report(Duration offset, std::int64_t delay_ns, bool stepped);
+  void fail(const std::string& reason);
+  [[nodiscard]] int finish();
+
+  platform::Kernel& kernel_;
+  PhcOptions options_;
+  Log& log_;
+  platform::ClockDevice source_;
+  std::unique_ptr<RealClock> sink_;
+  ClockComparison comparison_;
+  ClockDiscipline discipline_;
+  SampleSummary recent_;
+  SampleSummary since_lock_;
+  std::int64_t next_raw_ns_ = 0;
+  bool reading_failed_ = false;
+  bool clock_refuses_ = false;
+  std::optional<std::string> failure_;
+};
+
+}  // namespace ftcs::app

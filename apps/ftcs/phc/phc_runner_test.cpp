@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// World: a hardware clock 30 ppm fast and the system clock 20 ppm slow, 1 ms apart; reading the
+// hardware clock takes 0.8 us over the bus. `phc - system` is the truth.
+#include "apps/ftcs/phc/phc_runner.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "apps/ftcs/commands.h"
+#include "ftcs/platform/fake_clocks.h"
+
+namespace ftcs::app {
+namespace {
+
+using platform::FakeClocks;
+
+struct World {
+  World() {
+    kernel.phc.oscillator = 1.0 + 30e-6;
+    kernel.system.oscillator = 1.0 - 20e-6;
+    kernel.phc.time_ns = 1e6;
+    options.source = "/dev/ptp0";
+    options.sink_ahead_s = 0;
+    options.log_level = 3;
+  }
+  [[nodiscard]] double difference() const { return kernel.phc.time_ns - kernel.system.time_ns; }
+  int run(double seconds) {
+    options.duration = Duration::from_ns(seconds * 1e9);
+    auto runner = PhcRunner::open(kernel, options, log);
+    EXPECT_TRUE(runner.ok()) << runner.error();
+    return runner ? (*runner)->run() : -1;
+  }
+  /// As run(); the largest difference between the clocks after `settled_s`.
+  double largest_difference(double seconds, double settled_s) {
+    double largest = 0.0;
+    const double start = kernel.ideal_ns;
+    kernel.on_poll = [&, start] {
+      if (kernel.ideal_ns - start > settled_s * 1e9) {
+        largest = std::max(largest, std::abs(difference()));
+      }
+    };
+    EXPECT_EQ(run(seconds), kSuccess);
+    kernel.on_poll = nullptr;
+    return largest;
+  }
+
+  FakeClocks kernel;
+  Log log{kernel, stdout, 3};
+  PhcOptions options;
+};
+
+TEST(PhcRunner, brings_the_system_clock_to_a_hardware_clock) {
+  World world;
+  EXPECT_LT(world.largest_difference(30.0, 5.0), 50.0);
+  EXPECT_NEAR(world.kernel.phc.steering(), 1.0, 1e-15) << "the source is not touched";
+}
+
+TEST(PhcRunner, brings_a_hardware_clock_to_the_system_clock) {
+  World world;
+  world.options.source = "CLOCK_REALTIME";
+  world.options.sink = "/dev/ptp0";
+  EXPECT_LT(world.largest_difference(30.0, 5.0), 50.0);
+  EXPECT_NEAR(world.kernel.system.steering(), 1.0, 1e-15);
+}
+
+TEST(PhcRunner, keeps_a_constant_difference) {
+  World world;
+  world.options.sink_ahead_s = -37;
+  EXPECT_EQ(world.run(20.0), kSuccess);
+  EXPECT_NEAR(world.difference(), 37e9, 50.0);
+}
+
+TEST(PhcRunner, never_steps_if_told_so_and_is_there_within_two_readings) {
+  World world;
+  world.options.first_step_threshold = Nanoseconds{0};
+  double last = world.kernel.system.time_ns;
+  world.kernel.on_clock_read = [&] {
+    EXPECT_GE(world.kernel.system.time_ns, last) << "time never runs backward";
+    last = world.kernel.system.time_ns;
+  };
+  EXPECT_LT(world.largest_difference(20.0, 3.0), 200.0);
+}
+
+TEST(PhcRunner, by_every_way_of_comparing_clocks) {
+  for (const bool precise : {true, false}) {
+    World world;
+    world.kernel.precise_errno = precise ? 0 : EOPNOTSUPP;
+    world.kernel.extended_errno = ENOTTY;
+    EXPECT_LT(world.largest_difference(30.0, 5.0), 50.0) << (precise ? "precise" : "basic");
+  }
+}
+
+TEST(PhcRunner, slow_readings_count_for_less) {
+  for (const int readings : {1, 5}) {
+    World world;
+    world.options.readings = readings;
+    std::uint64_t state = 1;
+    world.kernel.on_clock_read = [&] {
+      // After a fifth of all bus accesses something else runs for up to 40 us.
+      state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+      if ((state >> 60) < 3) world.kernel.run(static_cast<double>((state >> 40) % 40'000));
+    };
+    EXPECT_LT(world.largest_difference(300.0, 60.0), readings == 1 ? 3'000.0 : 1'000.0) << readings;
+  }
+}
+
+TEST(PhcRunner, a_clock_that_somebody_else_steps_is_followed_again) {
+  World world;
+  bool stepped = false;
+  world.kernel.on_poll = [&] {
+    if (!stepped && world.kernel.ideal_ns > 10e9) {
+      world.kernel.system.time_ns += 5e6;
+      stepped = true;
+    }
+  };
+  EXPECT_EQ(world.run(40.0), kSuccess);
+  EXPECT_TRUE(stepped);
+  EXPECT_NEAR(world.difference(), 0.0, 200.0);
+}
+
+TEST(PhcRunner, comparing_alone_touches_nothing) {
+  World world;
+  world.options.free_running = true;
+  world.options.servo.kind = ServoKind::kFreeRunning;
+  EXPECT_EQ(world.run(10.0), kNotLocked);
+  EXPECT_EQ(world.kernel.commands, 0);
+}
+
+TEST(PhcRunner, a_source_that_is_unplugged_ends_the_run_and_the_rate_stays) {
+  World world;
+  world.kernel.on_poll = [&] { world.kernel.phc_gone = world.kernel.ideal_ns > 10e9; };
+  EXPECT_EQ(world.run(20.0), kRuntimeError);
+  EXPECT_NEAR(world.kernel.system.steering() * world.kernel.system.oscillator,
+              world.kernel.phc.oscillator, 1e-7);
+}
+
+TEST(PhcRunner, incomplete_readings_are_holdover_and_no_end) {
+  World world;
+  world.kernel.on_poll = [&] {
+    world.kernel.short_cross_reads = world.kernel.ideal_ns > 10e9 && world.kernel.ideal_ns < 20e9;
+  };
+  EXPECT_EQ(world.run(30.0), kSuccess);
+  EXPECT_NEAR(world.difference(), 0.0, 50.0);
+}
+
+TEST(PhcRunner, a_right_that_is_taken_away_ends_the_run) {
+  World world;
+  world.kernel.on_poll = [&] {
+    world.kernel.adjust_errno = world.kernel.ideal_ns > 5e9 ? EPERM : 0;
+  };
+  EXPECT_EQ(world.run(20.0), kRuntimeError);
+}
+
+TEST(PhcRunner, says_what_cannot_be_opened_and_touches_nothing) {
+  World world;
+  const auto error = [&] {
+    auto runner = PhcRunner::open(world.kernel, world.options, world.log);
+    return runner ? std::string("opened") : runner.error();
+  };
+  world.options.source = "/dev/ptp5";
+  EXPECT_EQ(error(), "/dev/ptp5: no such device");
+  world.options.source = "CLOCK_REALTIME";
+  EXPECT_EQ(error(), "CLOCK_REALTIME: source and sink are the same clock");
+  world.kernel.held_names.clear();
+  world.options.source = "/dev/ptp0";
+  world.kernel.precise_errno = world.kernel.extended_errno = world.kernel.basic_errno = ENOTTY;
+  EXPECT_NE(error().find("cannot compare"), std::string::npos);
+  world.kernel.held_names = {"ftcs clock realtime"};
+  EXPECT_NE(error().find("already in use"), std::string::npos);
+  EXPECT_EQ(world.kernel.commands, 0);
+}
+
+}  // namespace
+}  // namespace ftcs::app

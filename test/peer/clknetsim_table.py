@@ -1,0 +1,346 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The table of servos on true error, with unmodified programs inside clknetsim (https://github.com/mlichvar/clknetsim):
+ftcs ptp, ptp4l (pi, linreg) and chronyd steer the clock of one simulated node, whose hardware clock and system clock
+are the same clock; another node's perfect clock is the reference (ptp4l as PTP time transmitter, chronyd as NTP server).
+With `--suite phc`: ftcs phc beside phc2sys, the source being a hardware clock read with noise.
+
+  CLKNETSIM_PATH=folder test/peer/clknetsim_table.py --ftcs build/ftcs --seeds 20 --peer-seeds 5
+
+Each run has 1,200 cycles; rms and max are of the true error (8 readings a cycle) over the last 600. c5: cycles from the first
+Sync after the transmitter was selected (NTP: the first answer) until the true error stays within 5 x noise for 60 cycles.
+Every program is started without the right to set clocks (CAP_SYS_TIME dropped): a mistake cannot steer this machine.
+"""
+import argparse
+import json
+import math
+import os
+import random
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+
+START = 12.0  # s: by then a transmitter has been selected
+FREE_RUNNING = 10.4  # s, until then
+CYCLES = 1200
+MEASURED = 600
+LINK = "10e-6"
+
+
+def gaussian(sigma):
+    return f"(* {sigma} (normal))"
+
+
+def exponential(mean):
+    return f"(* {mean} (exponential))"
+
+
+def spikes(part):
+    return f"{gaussian(100e-9)} (* 100e-6 (equal {part} (uniform) 0.0))"
+
+
+class Scenario:
+    def __init__(self, name, interval=1.0, noise=100e-9, forward=None, backward=None, frequency=None, step=False,
+                 goal=None, event=None, c5_band=None):
+        self.name, self.interval, self.step, self.goal, self.event = name, interval, step, goal or {}, event
+        self.forward = forward or gaussian(noise)
+        self.backward = backward or forward or gaussian(noise)
+        self.frequency = frequency or (lambda rate: "50e-6")
+        self.c5_band = c5_band or 5 * noise
+        self.rate = round(8 / interval)  # clock readings a second: eight a cycle
+        self.length = START + CYCLES * interval
+        self.event_time = START + 600.3 * interval
+
+    def network(self, folder, seed):
+        forward, backward, lines = self.forward, self.backward, []
+        if self.event == "outage":
+            drop = " (* -1 (equal 30 time 642))"
+            forward, backward = forward + drop, backward + drop
+        if self.event == "path":
+            longer = f" (* 15e-6 (equal 1e6 time {self.event_time + 1e6}))"
+            forward, backward = forward + longer, backward + longer
+        if self.event == "reference":
+            count = round(self.length * self.rate) + 2 * self.rate
+            at = round(self.event_time * self.rate)
+            path = os.path.join(folder, "steps")
+            with open(path, "w") as steps:
+                steps.write("\n".join("20e-6" if i == at else "0" for i in range(count)) + "\n")
+            lines.append(f'node1_step = (file "{path}")')
+        draw = random.Random(seed)
+        return "\n".join(lines + [
+            f"node1_start = {draw.uniform(0.0, 1.0):.6f}",
+            f"node2_offset = {0.001 - 50e-6 * FREE_RUNNING}",  # 1 ms when the first Sync counts
+            f"node2_freq = {self.frequency(self.rate)}",
+            f"node1_delay2 = (+ {LINK} {forward})",
+            f"node2_delay1 = (+ {LINK} {backward})"]) + "\n"
+
+
+def walk(size):  # per sqrt(s)
+    return lambda rate: f"(+ 50e-6 (sum (* {size / math.sqrt(rate)} (normal))))"
+
+
+def square(cycles):
+    return lambda rate: f"(+ 50e-6 (* 1e-6 (pulse {8 * cycles} {8 * cycles})))"
+
+
+def sine(cycles):
+    return lambda rate: f"(+ 50e-6 (* 0.5e-6 (sine {8 * cycles})))"
+
+
+FAST = 0.125
+SCENARIOS = [
+    Scenario("g100 1 s step", step=True, goal={"c5": (2, None), "rms": (5, 12)}),
+    Scenario("g100 1 s never step", goal={"c5": (2, None), "rms": (5, 12)}),
+    Scenario("g100 125 ms never step", FAST, goal={"c5": (2, None), "rms": (5, 12)}),
+    Scenario("g1000 125 ms step", FAST, noise=1e-6, step=True, goal={"rms": (45, 120)}),
+    Scenario("e100 1 s", forward=exponential(100e-9), goal={"rms": (4, 8)}),
+    Scenario("wander 1e-9 1 s", frequency=walk(1e-9), goal={"rms": (32, 40)}),
+    Scenario("wander 1e-9 125 ms", FAST, frequency=walk(1e-9), goal={"rms": (15, 25)}),
+    Scenario("wander 1e-8 1 s", frequency=walk(1e-8), goal={"rms": (58, 65)}),
+    Scenario("wander 1e-8 125 ms", FAST, frequency=walk(1e-8), goal={"rms": (27, 35)}),
+    Scenario("2 % +100 us 1 s", forward=spikes(0.02), goal={"rms": (10, 30), "max": (60, 100)}),
+    Scenario("10 % +100 us 1 s", forward=spikes(0.1), goal={"rms": (10, None), "max": (60, 1000)}),
+    Scenario("+-1 ppm steps 1 s", frequency=square(50), goal={"rms": (180, 230)}),
+    Scenario("+-1 ppm steps 125 ms", FAST, frequency=square(50), goal={"rms": (85, 100)}),
+    Scenario("sine 1 s", frequency=sine(75), goal={"rms": (95, 105)}),
+    Scenario("sine 125 ms", FAST, frequency=sine(75), goal={"rms": (58, 65)}),
+    Scenario("one-way load 1 s", forward=exponential(1e-6), backward=gaussian(100e-9), goal={"rms": (40, 60)}),
+    Scenario("60 s outage", event="outage", goal={"rms": (10, 30)}),
+    Scenario("20 us reference step", event="reference", goal={"after 3": (500, 1000), "overshoot": (1000, 1000)}),
+    Scenario("15 us path change", event="path", goal={"max": (1000, 1000)}),
+]
+# The source of a clock comparison: a hardware clock whose reading is noisy.
+PHC_SCENARIOS = [
+    Scenario("phc g100 1 Hz step", step=True),
+    Scenario("phc g100 1 Hz never step"),
+    Scenario("phc g100 8 Hz step", FAST, step=True),
+    Scenario("phc wander 1e-8 1 Hz", step=True, frequency=walk(1e-8)),
+    Scenario("phc +-1 ppm steps 1 Hz", step=True, frequency=square(50)),
+    Scenario("phc 2 % +100 us 1 Hz", step=True, forward=spikes(0.02)),
+]
+
+
+def write(path, text):
+    with open(path, "w") as file:
+        file.write(text)
+    return path
+
+
+def ptp4l_config(scenario, folder, name, settings):
+    log = round(math.log2(scenario.interval))
+    lines = {"logSyncInterval": log, "logMinDelayReqInterval": log, "summary_interval": 30, **settings}
+    return write(os.path.join(folder, name), "[global]\n" + "".join(f"{k} {v}\n" for k, v in lines.items()))
+
+
+def ptp_transmitter(scenario, folder, tools):
+    config = ptp4l_config(scenario, folder, "transmitter.conf", {"free_running": 1})
+    return [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]
+
+
+def ftcs(servo, *more):
+    def commands(scenario, folder, tools):
+        node = [tools["ftcs"], "ptp", "-i", "eth0", "--servo", servo, *(more or ("-H", "--clock", "phc"))]
+        return [ptp_transmitter(scenario, folder, tools), node + (["--first-step"] if scenario.step else [])]
+    return commands
+
+
+def ptp4l(servo):
+    def commands(scenario, folder, tools):
+        config = ptp4l_config(scenario, folder, "receiver.conf", {
+            "slaveOnly": 1, "clock_servo": servo, "first_step_threshold": "0.00002" if scenario.step else "0.0"})
+        return [ptp_transmitter(scenario, folder, tools), [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]]
+    return commands
+
+
+def chronyd(scenario, folder, tools):
+    poll = round(math.log2(scenario.interval))
+    server = write(os.path.join(folder, "server.conf"),
+                   f"local stratum 1\nallow\npidfile {folder}/pid1\ncmdport 0\nbindcmdaddress /\n")
+    step = "makestep 2e-5 1\n" if scenario.step else ""
+    client = write(os.path.join(folder, "client.conf"),
+                   f"server 192.168.123.1 minpoll {poll} maxpoll {poll} xleave\n{step}maxslewrate 30000\n"
+                   f"pidfile {folder}/pid2\ncmdport 0\nbindcmdaddress /\n")
+    return [[tools["chronyd"], "-d", "-u", "root", "-f", server], [tools["chronyd"], "-d", "-u", "root", "-f", client]]
+
+
+def ftcs_phc(scenario, _folder, tools):
+    return [[tools["ftcs"], "phc", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
+             "-F", "0.00002" if scenario.step else "0"]]
+
+
+def phc2sys(servo):
+    def commands(scenario, _folder, tools):
+        return [[tools["phc2sys"], "-s", "/dev/ptp0", "-c", "CLOCK_REALTIME", "-O", "0", "-m", "-q", "-E", servo,
+                 "-R", str(1 / scenario.interval), "-F", "0.00002" if scenario.step else "0"]]
+    return commands
+
+
+CANDIDATES = {
+    "ftcs": ftcs("adaptive"),
+    "ftcs system clock": ftcs("adaptive", "-S", "--clock", "system", "--utc_offset", "0"),
+    "ftcs linuxptp-pi": ftcs("linuxptp-pi"),
+    "ptp4l pi": ptp4l("pi"),
+    "ptp4l linreg": ptp4l("linreg"),
+    "chronyd": chronyd,
+}
+PHC_CANDIDATES = {"ftcs phc": ftcs_phc, "phc2sys pi": phc2sys("pi"), "phc2sys linreg": phc2sys("linreg")}
+
+GUARD = ["setpriv", "--bounding-set", "-sys_time", "--inh-caps", "-sys_time"]
+
+
+def simulate(scenario, commands, seed, folder, path):
+    """Returns (offset of the steered clock against the reference in ns, time of the first message that counts)."""
+    socket, offsets, packets = (os.path.join(folder, name) for name in ("socket", "offsets", "packets"))
+    steered = len(commands)  # the last node
+    text = scenario.network(folder, seed)
+    if steered == 1:
+        noise = scenario.forward
+        text = f"node1_offset = 0.001\nnode1_freq = {scenario.frequency(scenario.rate)}\nnode1_refclock = (+ 0 {noise})\n"
+    config = write(os.path.join(folder, "network"), text)
+    nodes, logs = [], []
+    for number, command in enumerate(commands, 1):
+        logs.append(os.path.join(folder, f"log{number}"))
+        preload = [f"LD_PRELOAD={path}/clknetsim.so", f"CLKNETSIM_NODE={number}", f"CLKNETSIM_SOCKET={socket}",
+                   f"CLKNETSIM_RANDOM_SEED={1000 * number + seed}"]
+        with open(logs[-1], "w") as log:
+            nodes.append(subprocess.Popen(GUARD + ["env"] + preload + command, stdout=log, stderr=subprocess.STDOUT))
+    server = subprocess.run([f"{path}/clknetsim", "-s", socket, "-R", str(scenario.rate), "-o", offsets, "-p", packets,
+                             "-l", str(scenario.length), config, str(steered)], capture_output=True, text=True,
+                            env={**os.environ, "CLKNETSIM_RANDOM_SEED": str(seed)}, check=False)
+    for node in nodes:
+        node.wait()
+    if server.returncode != 0:
+        raise RuntimeError(server.stderr + open(logs[-1]).read()[-2000:])
+    errors = []
+    with open(offsets) as file:
+        for line in file:
+            values = [float(value) for value in line.split()]
+            errors.append((values[-1] - (values[0] if steered > 1 else 0.0)) * 1e9)
+    return errors, first_message(logs[-1], packets) if steered > 1 else 0.0
+
+
+def first_message(log, packets):
+    """The first Sync after the port has a transmitter; without PTP the first packet to the steered node."""
+    since = 0.0
+    for line in open(log):
+        found = re.match(r"\S+\[(\d+\.\d+)\]: port 1.*: LISTENING to UNCALIBRATED", line)
+        if found:
+            since = float(found[1]) - 0.01
+            break
+    for line in open(packets):
+        fields = line.split()
+        is_ntp = since == 0.0
+        if fields[1] == "1" and fields[2] == "2" and (is_ntp or (fields[5] == "319" and float(fields[0]) >= since)):
+            return float(fields[0])
+    return math.nan
+
+
+def rms(values):
+    return math.sqrt(sum(value * value for value in values) / len(values)) if values else math.nan
+
+
+def judge(scenario, errors, first):
+    per_cycle, rate = 8, scenario.rate
+    figures = {}
+    tail = errors[-MEASURED * per_cycle:]
+    figures["rms"], figures["max"] = rms(tail), max(map(abs, tail))
+    if scenario.event == "outage":
+        figures["rms"] = rms(errors[round(669.5 * rate):round(671 * rate)])
+        figures["max"] = max(map(abs, errors[round(669.5 * rate):round(671 * rate)]))
+    if scenario.event == "reference":
+        at = round(scenario.event_time * rate)
+        figures["after 3"] = max(map(abs, errors[at + 3 * per_cycle:at + 100 * per_cycle]))
+        figures["overshoot"] = max(0.0, max(errors[at:at + 100 * per_cycle]))  # we start 20 us behind
+    band, dwell = scenario.c5_band * 1e9, 60 * per_cycle
+    run = 0
+    figures["c5"] = math.inf
+    for i, error in enumerate(errors):
+        run = run + 1 if abs(error) < band else 0
+        if run == dwell:
+            # Reading i was taken (i + 1) / rate s after the start (the first one is the start itself).
+            figures["c5"] = max(0.0, ((i - dwell + 1) / rate - first) / scenario.interval)
+            break
+    return figures
+
+
+def number(value):
+    if math.isinf(value):
+        return "never"
+    return f"{value:.2f}" if abs(value) < 10 else f"{value:.0f}" if abs(value) >= 100 else f"{value:.1f}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--ftcs", default="build/ftcs")
+    parser.add_argument("--suite", choices=["ptp", "phc"], default="ptp")
+    parser.add_argument("--seeds", type=int, default=20, help="of ftcs")
+    parser.add_argument("--peer-seeds", type=int, default=5)
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--scenario", action="append", help="part of a name; default all")
+    parser.add_argument("--candidate", action="append", help="a name; default ftcs and the peers that are there")
+    parser.add_argument("--chronyd", default=shutil.which("chronyd") or "/usr/sbin/chronyd")
+    parser.add_argument("--results", help="write every figure as JSON lines")
+    parser.add_argument("--check", action="store_true", help="exit code 1 if ftcs misses a median")
+    arguments = parser.parse_args()
+
+    path = os.environ.get("CLKNETSIM_PATH", "")
+    if not os.access(os.path.join(path, "clknetsim"), os.X_OK):
+        print("skipped: CLKNETSIM_PATH names no folder with clknetsim")
+        return 77
+    if not shutil.which("setpriv"):
+        print("skipped: no setpriv to drop the right to set clocks")
+        return 77
+    def find(name):
+        return shutil.which(name) or f"/usr/sbin/{name}"
+    tools = {"ftcs": os.path.realpath(arguments.ftcs), "ptp4l": find("ptp4l"), "phc2sys": find("phc2sys"),
+             "chronyd": arguments.chronyd}
+    if not os.access(tools["ptp4l"], os.X_OK):
+        print("skipped: no ptp4l")
+        return 77
+    candidates = CANDIDATES if arguments.suite == "ptp" else PHC_CANDIDATES
+    scenarios = SCENARIOS if arguments.suite == "ptp" else PHC_SCENARIOS
+    default = [name for name in candidates if name not in ("ftcs system clock", "ftcs linuxptp-pi")
+               and (name != "chronyd" or os.access(tools["chronyd"], os.X_OK))]
+    missed = []
+    print(f"{'scenario':24} {'program':18} {'seeds':>5}  c5 median / worst   rms median / worst   max median / worst")
+    for scenario in scenarios:
+        if arguments.scenario and not any(part in scenario.name for part in arguments.scenario):
+            continue
+        for name in arguments.candidate or default:
+            seeds = arguments.seeds if name.startswith("ftcs") else arguments.peer_seeds
+            runs = []
+            for seed in range(arguments.first_seed, arguments.first_seed + seeds):
+                with tempfile.TemporaryDirectory() as folder:
+                    errors, first = simulate(scenario, candidates[name](scenario, folder, tools), seed, folder, path)
+                runs.append(judge(scenario, errors, first))
+                if arguments.results:
+                    with open(arguments.results, "a") as file:
+                        file.write(json.dumps({"scenario": scenario.name, "program": name, "seed": seed,
+                                               **runs[-1]}) + "\n")
+            def both(figure, runs=runs):
+                values = [run[figure] for run in runs]
+                return statistics.median(values), max(values)
+            columns = [f"{number(m):>8} / {number(w):<8}" for m, w in (both("c5"), both("rms"), both("max"))]
+            extra = "".join(f"  {figure} {number(both(figure)[0])} / {number(both(figure)[1])}"
+                            for figure in ("after 3", "overshoot") if figure in runs[0])
+            verdict = ""
+            if name == "ftcs" and scenario.goal:
+                wrong = []
+                for figure, (median, worst) in scenario.goal.items():
+                    if both(figure)[0] > median:
+                        wrong.append(f"{figure} median {number(both(figure)[0])} > {median}")
+                        missed.append(f"{scenario.name}: {wrong[-1]}")
+                    if worst is not None and both(figure)[1] > worst:
+                        wrong.append(f"{figure} worst {number(both(figure)[1])} > {worst}")
+                verdict = "  goals met" if not wrong else "  MISSED: " + ", ".join(wrong)
+            print(f"{scenario.name:24} {name:18} {seeds:5}  {'  '.join(columns)}{extra}{verdict}", flush=True)
+    for line in missed:
+        print("missed:", line)
+    return 1 if missed and arguments.check else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
