@@ -41,6 +41,11 @@ expect 1 "$folder/wrong.list:2: not later than the line before" ptp -i lo --cloc
 
 expect 2 "no source: give one with -s" phc
 expect 2 "the time offset must be given" phc -s /dev/ptp0
+expect 2 "-r is of -a" phc -r
+expect 2 "-a needs -r" phc -a
+expect 2 "the system clock as a source is not supported" phc -a -r -r
+expect 2 "-a finds the clocks itself" phc -a -r -s eth0
+expect 2 "-a and -O exclude each other" phc -a -r -O 0
 expect 2 "-O and --leapfile exclude each other" phc -s /dev/ptp0 -O 0 --leapfile x
 expect 2 "only where CLOCK_REALTIME is steered" phc -s CLOCK_REALTIME -c eth0 --leapfile x
 expect 2 "'linreg' is not supported" phc -s /dev/ptp0 -O 0 -E linreg

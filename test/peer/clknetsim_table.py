@@ -135,8 +135,8 @@ def ptp4l_config(scenario, folder, name, settings):
     return write(os.path.join(folder, name), "[global]\n" + "".join(f"{k} {v}\n" for k, v in lines.items()))
 
 
-def ptp_transmitter(scenario, folder, tools):
-    config = ptp4l_config(scenario, folder, "transmitter.conf", {"free_running": 1})
+def ptp_transmitter(scenario, folder, tools, settings=None):
+    config = ptp4l_config(scenario, folder, "transmitter.conf", {"free_running": 1, **(settings or {})})
     return [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]
 
 
@@ -145,6 +145,12 @@ def ftcs(servo, *more):
         node = [tools["ftcs"], "ptp", "-i", "eth0", "--servo", servo, *(more or ("-H", "--clock", "phc"))]
         return [ptp_transmitter(scenario, folder, tools), node + (["--first-step"] if scenario.step else [])]
     return commands
+
+
+def ftcs_p2p(scenario, folder, tools):
+    peer = {"delay_mechanism": "P2P", "logMinPdelayReqInterval": round(math.log2(scenario.interval))}
+    node = [tools["ftcs"], "ptp", "-i", "eth0", "-P", "-H", "--clock", "phc"]
+    return [ptp_transmitter(scenario, folder, tools, peer), node + (["--first-step"] if scenario.step else [])]
 
 
 def ptp4l(servo):
@@ -181,6 +187,7 @@ def phc2sys(servo):
 CANDIDATES = {
     "ftcs": ftcs("adaptive"),
     "ftcs system clock": ftcs("adaptive", "-S", "--clock", "system", "--utc_offset", "0"),
+    "ftcs p2p": ftcs_p2p,
     "ftcs linuxptp-pi": ftcs("linuxptp-pi"),
     "ptp4l pi": ptp4l("pi"),
     "ptp4l linreg": ptp4l("linreg"),
@@ -302,7 +309,7 @@ def main():
         return 77
     candidates = CANDIDATES if arguments.suite == "ptp" else PHC_CANDIDATES
     scenarios = SCENARIOS if arguments.suite == "ptp" else PHC_SCENARIOS
-    default = [name for name in candidates if name not in ("ftcs system clock", "ftcs linuxptp-pi")
+    default = [name for name in candidates if name not in ("ftcs system clock", "ftcs p2p", "ftcs linuxptp-pi")
                and (name != "chronyd" or os.access(tools["chronyd"], os.X_OK))]
     missed = []
     print(f"{'scenario':24} {'program':18} {'seeds':>5}  c5 median / worst   rms median / worst   max median / worst")

@@ -30,6 +30,7 @@ struct PhcArguments {
   std::string max_frequency;
   std::optional<double> duration_s;
   bool leap_by_us = false;
+  int system_clock = 0;  ///< how many -r
 };
 
 void refuse(CLI::App& command, const char* flag, const char* reason, bool takes_value) {
@@ -60,6 +61,24 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
       ->type_name("FILE");
   command.add_flag("-x", arguments.leap_by_us,
                    "leap seconds by stepping the clock instead of by the kernel");
+  command.add_flag("-a", options.automatic,
+                   "follow the state of a PTP port of this machine; with -r");
+  command.add_flag("-r", arguments.system_clock,
+                   "-a: the system clock follows the port's clock while that receives time");
+  command.add_flag("-w", options.wait_for_port,
+                   "wait until the PTP port is synchronised, and take UTC from it");
+  command
+      .add_option("-z", options.port.socket,
+                  "-a, -w: management socket of ptp4l or ftcs ptp; default /var/run/ptp4l")
+      ->type_name("PATH");
+  command.add_option("-n", options.port.domain, "-a, -w: PTP domain; default 0")
+      ->type_name("DOMAIN")
+      ->check(integer_from(0, 255));
+  command
+      .add_option("--transportSpecific", options.port.major_sdo_id,
+                  "-a, -w: majorSdoId, 0 to 15; default 0")
+      ->type_name("VALUE")
+      ->check(integer_from(0, 15));
   command.add_flag("--free-running", options.free_running, "compare, steer nothing");
 }
 
@@ -120,13 +139,6 @@ void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
 }
 
 void refuse_the_rest(CLI::App& command) {
-  constexpr const char* kNoPort =
-      "following a PTP port's state is not supported: give -s, -c and -O or --leapfile";
-  refuse(command, "-a", kNoPort, false);
-  refuse(command, "-r", kNoPort, false);
-  refuse(command, "-w", kNoPort, false);
-  refuse(command, "-n", kNoPort, true);
-  refuse(command, "-z", kNoPort, true);
   refuse(command, "-d", "a PPS source is not supported", true);
   refuse(command, "-f", "a configuration file is not supported", true);
   refuse(command, "-t", "a message tag is not supported", true);
@@ -168,6 +180,7 @@ Wrong apply_servo(const PhcArguments& arguments, PhcOptions& options) {
 Wrong apply_offset(PhcOptions& options) {
   const bool from_system = options.source == "CLOCK_REALTIME";
   const bool to_system = options.sink == "CLOCK_REALTIME";
+  if (options.automatic || options.wait_for_port) return std::nullopt;  // the port knows
   if (options.sink_ahead_s) {
     if (!options.leap_file.empty()) return "-O and --leapfile exclude each other";
     return std::nullopt;
@@ -183,28 +196,34 @@ Wrong apply_offset(PhcOptions& options) {
   return std::nullopt;
 }
 
+/// -a -r and what does not go with it.
+Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) {
+  if (!options.automatic) {
+    return arguments.system_clock > 0 ? Wrong("-r is of -a") : std::nullopt;
+  }
+  if (arguments.system_clock == 0) return "-a needs -r: the system clock is what can follow";
+  if (arguments.system_clock > 1) return "-r -r: the system clock as a source is not supported";
+  if (options.wait_for_port) return "-a and -w exclude each other";
+  if (options.sink_ahead_s) return "-a and -O exclude each other";
+  if (!options.source.empty() || options.sink != "CLOCK_REALTIME") {
+    return "-a finds the clocks itself: without -s and -c";
+  }
+  return std::nullopt;
+}
+
 Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
   const auto nanoseconds = [](double seconds) {
     return Nanoseconds{Duration::from_ns(seconds * 1e9).rounded_ns()};
   };
-  if (options.source.empty()) return "no source: give one with -s, for example -s eth0";
+  if (auto wrong = check_automatic(arguments, options)) return wrong;
+  if (options.source.empty() && !options.automatic)
+    return "no source: give one with -s, for example -s eth0";
   if (arguments.first_step_s) options.first_step_threshold = nanoseconds(*arguments.first_step_s);
   if (arguments.step_s) options.step_threshold = nanoseconds(*arguments.step_s);
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
   options.kernel_leap = !arguments.leap_by_us;
   if (auto wrong = apply_offset(options)) return wrong;
   return apply_servo(arguments, options);
-}
-
-int run(const PhcOptions& options) {
-  platform::LinuxKernel kernel;
-  Log log(kernel, stdout, options.log_level);
-  auto runner = PhcRunner::open(kernel, options, log);
-  if (!runner) {
-    log(LogLevel::kError, "{}", runner.error());
-    return kRuntimeError;
-  }
-  return (*runner)->run();
 }
 
 }  // namespace
@@ -226,7 +245,9 @@ void add_phc_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
-    exit_code = run(options);
+    platform::LinuxKernel kernel;
+    Log log(kernel, stdout, options.log_level);
+    exit_code = run_phc(kernel, options, log);
   });
 }
 

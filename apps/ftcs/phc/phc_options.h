@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/ftcs/phc/port_watch.h"
 #include "ftcs/servo/any_servo.h"
 #include "ftcs/time/duration.h"
 
@@ -27,6 +28,9 @@ struct PhcOptions {
   std::optional<int> sink_ahead_s{};    ///< -O: sink - source; none: by the leap second list
   std::string leap_file{};
   bool kernel_leap = true;
+  bool automatic = false;      ///< -a -r: source is the clock of the PTP port that receives time
+  bool wait_for_port = false;  ///< -w: until the PTP port is synchronised; its UTC offset holds
+  PortAddress port{};
   int readings = 5;
   double rate_hz = 1.0;
   ServoConfig servo = phc_servo_defaults();

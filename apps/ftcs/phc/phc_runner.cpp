@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "apps/ftcs/commands.h"
@@ -80,6 +81,9 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       sink_(std::move(clocks.sink)),
       comparison_(std::move(clocks.comparison)),
       discipline_(discipline_config(options, comparison_.is_exact()), sink_->clock()) {
+  if (options.automatic || options.wait_for_port) {
+    if (!options.sink_ahead_s) return;  // the port will tell
+  }
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
   ReferenceScale scale;
   scale.tai = !options.sink_ahead_s && sink_->is_system();
@@ -88,6 +92,37 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
     sink_->clock().set_timescale_offset(
         Duration::from_whole_ns(-*options.sink_ahead_s * kNsPerSecond));
   }
+}
+
+void PhcRunner::follow_port(PortWatch watch, bool receiving) {
+  watch_.emplace(std::move(watch));
+  needs_receiver_ = receiving;
+  following_ = false;
+}
+
+// A hardware clock that follows the system clock is to show TAI; the other way round RealClock
+// knows what to do.
+void PhcRunner::set_scale(const ReferenceScale& scale) {
+  if (options_.sink_ahead_s) return;
+  if (sink_->is_system()) return sink_->set_reference_scale(scale);
+  if (!source_.is_system()) return;
+  const int ahead = scale.tai ? scale.utc_offset.value_or(UtcConfig{}.utc_offset) : 0;
+  sink_->clock().set_timescale_offset(Duration::from_whole_ns(-ahead * kNsPerSecond));
+}
+
+bool PhcRunner::may_follow() {
+  if (!watch_) return true;
+  watch_->attend(kernel_.clock_ns(CLOCK_MONOTONIC_RAW));
+  const bool may = needs_receiver_ ? watch_->is_receiving() : watch_->is_synchronised();
+  if (may) set_scale(watch_->port()->scale);
+  if (may == following_) return may;
+  following_ = may;
+  const std::string_view state =
+      watch_->port() ? to_string(watch_->port()->state) : std::string_view{"silent"};
+  log_(LogLevel::kNotice, "the PTP port is {}: {}", state,
+       may ? "following" : "keeping the last rate");
+  if (may && discipline_.counters().commands > 0) discipline_.on_new_reference();
+  return may;
 }
 
 int PhcRunner::run() {
@@ -103,7 +138,15 @@ int PhcRunner::run() {
   };
   while (!stop.is_set() && !failure_ && !is_over()) {
     wait();
-    if (kernel_.clock_ns(CLOCK_MONOTONIC_RAW) >= next_raw_ns_) take_sample();
+    const bool may = may_follow();
+    if (kernel_.clock_ns(CLOCK_MONOTONIC_RAW) >= next_raw_ns_) {
+      schedule_next();
+      if (may) {
+        take_sample();
+      } else {
+        (void)discipline_.on_silence();
+      }
+    }
     const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
                                      discipline_.latest().servo);
     if (wrong) fail(*wrong);
@@ -128,13 +171,15 @@ void PhcRunner::wait() {
   if (kernel_.poll({&timer, 1}, static_cast<int>(ms)) > 0) sink_->on_wake();
 }
 
-void PhcRunner::take_sample() {
+void PhcRunner::schedule_next() {
   const auto period =
       static_cast<std::int64_t>(static_cast<double>(kNsPerSecond) / options_.rate_hz);
   const std::int64_t now = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
   next_raw_ns_ += period;
   if (next_raw_ns_ <= now) next_raw_ns_ = now + period;  // a long pause is not made up for
+}
 
+void PhcRunner::take_sample() {
   const auto comparison = comparison_.read(options_.readings);
   if (!comparison) {
     const auto& error = comparison.error();
@@ -204,6 +249,51 @@ int PhcRunner::finish() {
     log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
   }
   return locked ? kSuccess : kNotLocked;
+}
+
+namespace {
+
+/// -a: until the port says on which interface it receives time. False: stopped before.
+bool wait_for_receiver(platform::Kernel& kernel, const PhcOptions& options, PortWatch& watch) {
+  constexpr int kTurnMs = 50;
+  const platform::StopFlag stop;
+  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
+  for (std::int64_t now = start; !watch.is_receiving();
+       now = kernel.clock_ns(CLOCK_MONOTONIC_RAW)) {
+    if (stop.is_set()) return false;
+    if (options.duration && now - start >= options.duration->floor_ns()) return false;
+    watch.attend(now);
+    (void)kernel.poll({}, kTurnMs);
+  }
+  return true;
+}
+
+}  // namespace
+
+int run_phc(platform::Kernel& kernel, PhcOptions options, Log& log) {
+  const auto refuse = [&log](const std::string& reason) {
+    log(LogLevel::kError, "{}", reason);
+    return kRuntimeError;
+  };
+  std::optional<PortWatch> watch;
+  if (options.automatic || options.wait_for_port) {
+    auto opened = PortWatch::open(options.port);
+    if (!opened) return refuse(opened.error().message());
+    watch.emplace(std::move(*opened));
+    log(LogLevel::kNotice, "waiting for a PTP port at {}", options.port.socket);
+  }
+  if (options.automatic) {
+    if (!wait_for_receiver(kernel, options, *watch)) return kNotLocked;
+    if (!watch->port()->hardware_timestamps) {
+      return refuse("the PTP port on " + watch->port()->interface +
+                    " takes software timestamps: its clock is the system clock already");
+    }
+    options.source = watch->port()->interface;
+  }
+  auto runner = PhcRunner::open(kernel, options, log);
+  if (!runner) return refuse(runner.error());
+  if (watch) (*runner)->follow_port(std::move(*watch), options.automatic);
+  return (*runner)->run();
 }
 
 }  // namespace ftcs::app

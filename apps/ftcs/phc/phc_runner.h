@@ -8,6 +8,7 @@
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/phc/clock_comparison.h"
 #include "apps/ftcs/phc/phc_options.h"
+#include "apps/ftcs/phc/port_watch.h"
 #include "apps/ftcs/real_clock.h"
 #include "apps/ftcs/sample_report.h"
 #include "ftcs/discipline/clock_discipline.h"
@@ -30,6 +31,9 @@ class PhcRunner {
   [[nodiscard]] static Result<std::unique_ptr<PhcRunner>, std::string> open(
       platform::Kernel& kernel, const PhcOptions& options, Log& log);
 
+  /// From now on it steers only while that PTP port is synchronised (`receiving`: as a receiver),
+  /// and takes UTC from it. Before run().
+  void follow_port(PortWatch watch, bool receiving);
   /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
   [[nodiscard]] int run();
 
@@ -42,6 +46,9 @@ class PhcRunner {
   PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
 
   void wait();
+  [[nodiscard]] bool may_follow();
+  void set_scale(const ReferenceScale& scale);
+  void schedule_next();
   void take_sample();
   void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
   void report(Duration offset, std::int64_t delay_ns, bool stepped);
@@ -55,6 +62,9 @@ class PhcRunner {
   std::unique_ptr<RealClock> sink_;
   ClockComparison comparison_;
   ClockDiscipline discipline_;
+  std::optional<PortWatch> watch_;
+  bool needs_receiver_ = false;
+  bool following_ = true;
   SampleSummary recent_;
   SampleSummary since_lock_;
   std::int64_t next_raw_ns_ = 0;
@@ -62,5 +72,8 @@ class PhcRunner {
   bool clock_refuses_ = false;
   std::optional<std::string> failure_;
 };
+
+/// Everything that `ftcs phc` does once its options are known to be consistent.
+[[nodiscard]] int run_phc(platform::Kernel& kernel, PhcOptions options, Log& log);
 
 }  // namespace ftcs::app

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/phc/port_watch.h"
+
+#include <utility>
+#include <variant>
+
+#include "apps/ftcs/time_feed.h"
+
+namespace ftcs::app {
+namespace {
+
+constexpr std::int64_t kQuestionIntervalNs = 1'000'000'000;
+constexpr std::int64_t kPatienceNs = 5'000'000'000;
+constexpr int kAnswersAtOnce = 16;
+
+}  // namespace
+
+Result<PortWatch, platform::OsError> PortWatch::open(const PortAddress& address) {
+  auto socket = platform::LocalSocket::client();
+  if (!socket) return socket.error();
+  return PortWatch(address, std::move(*socket));
+}
+
+void PortWatch::attend(std::int64_t now_ns) {
+  for (int i = 0; i < kAnswersAtOnce; ++i) {
+    const auto datagram = socket_.receive();
+    if (!datagram) break;
+    const auto message = ptp::decode_management(datagram->bytes);
+    if (message && message->data) take(*message->data, now_ns);
+  }
+  if (port_ && now_ns - answered_ns_ > kPatienceNs) {
+    port_.reset();
+    properties_.reset();
+    scale_.reset();
+  }
+  if (asked_ns_ && now_ns - *asked_ns_ < kQuestionIntervalNs) return;
+  asked_ns_ = now_ns;
+  ask(ptp::ManagementId::kPortPropertiesNp);
+  ask(ptp::ManagementId::kTimePropertiesDataSet);
+}
+
+// To all ports, as pmc -b 0 asks. Nobody there is no error: it may come.
+void PortWatch::ask(ptp::ManagementId id) {
+  ptp::ManagementMessage question;
+  question.header.domain = address_.domain;
+  question.header.major_sdo_id = address_.major_sdo_id;
+  question.header.minor_version = 0;  // every version of linuxptp takes it
+  question.body.target.clock.octets.fill(0xFF);
+  question.body.target.port = 0xFFFF;
+  question.id = id;
+  (void)socket_.send(address_.socket, ptp::encode_management(question).view());
+}
+
+// A boundary clock answers for each of its ports: the one that receives time is the one that
+// counts.
+void PortWatch::take(const ptp::ManagementData& data, std::int64_t now_ns) {
+  if (const auto* properties = std::get_if<ptp::PortPropertiesNp>(&data)) {
+    const bool other = properties_ && properties_->port != properties->port;
+    const bool receives = properties->state == ptp::PortState::kTimeReceiver;
+    const bool held = properties_ && properties_->state == ptp::PortState::kTimeReceiver;
+    if (!other || receives || !held) properties_ = *properties;
+  } else if (const auto* time = std::get_if<ptp::TimePropertiesDataSet>(&data)) {
+    scale_ = reference_scale(time->flags, time->utc_offset);
+  }
+  if (!properties_ || !scale_) return;
+  answered_ns_ = now_ns;
+  port_ = Port{properties_->state, properties_->timestamping != 0,
+               std::string(properties_->interface.view()), *scale_};
+}
+
+}  // namespace ftcs::app

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "apps/ftcs/real_clock.h"
+#include "ftcs/platform/local_socket.h"
+#include "ftcs/platform/os_error.h"
+#include "ftcs/ptp/port_state.h"
+#include "ftcs/ptp/wire/management.h"
+#include "ftcs/time/result.h"
+
+namespace ftcs::app {
+
+/// Where a PTP program of this machine is asked, and in which domain.
+struct PortAddress {
+  std::string socket = "/var/run/ptp4l";
+  std::uint8_t domain = 0;
+  std::uint8_t major_sdo_id = 0;
+};
+
+/// What a PTP program of this machine (ptp4l, ftcs ptp) says about its port over its management
+/// socket: asked once a second, never waited for.
+class PortWatch {
+ public:
+  [[nodiscard]] static Result<PortWatch, platform::OsError> open(const PortAddress& address);
+
+  /// Reads what has come, and asks again when a second has passed. `now_ns`: any monotonic clock.
+  void attend(std::int64_t now_ns);
+
+  struct Port {
+    ptp::PortState state = ptp::PortState::kInitializing;
+    bool hardware_timestamps = false;
+    std::string interface;
+    ReferenceScale scale{};
+  };
+  /// No value: no complete answer for five seconds.
+  [[nodiscard]] const std::optional<Port>& port() const { return port_; }
+  /// It follows a transmitter.
+  [[nodiscard]] bool is_receiving() const {
+    return port_ && port_->state == ptp::PortState::kTimeReceiver;
+  }
+  /// Its clock is the reference or follows one.
+  [[nodiscard]] bool is_synchronised() const {
+    return is_receiving() || (port_ && port_->state == ptp::PortState::kTimeTransmitter);
+  }
+
+ private:
+  PortWatch(PortAddress address, platform::LocalSocket socket)
+      : address_(std::move(address)), socket_(std::move(socket)) {}
+
+  void ask(ptp::ManagementId id);
+  void take(const ptp::ManagementData& data, std::int64_t now_ns);
+
+  PortAddress address_;
+  platform::LocalSocket socket_;
+  std::optional<Port> port_;
+  std::optional<ptp::PortPropertiesNp> properties_;
+  std::optional<ReferenceScale> scale_;
+  std::optional<std::int64_t> asked_ns_;
+  std::int64_t answered_ns_ = 0;
+};
+
+}  // namespace ftcs::app

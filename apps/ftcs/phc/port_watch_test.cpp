@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// World: a PTP program on this machine that answers at its management socket, and a hardware clock
+// 1 ms ahead of CLOCK_REALTIME plus 37 s.
+#include "apps/ftcs/phc/port_watch.h"
+
+#include <cmath>
+#include <filesystem>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "apps/ftcs/commands.h"
+#include "apps/ftcs/phc/phc_runner.h"
+#include "ftcs/platform/fake_clocks.h"
+
+namespace ftcs::app {
+namespace {
+
+using ptp::PortState;
+
+/// Answers what is asked, as ptp4l does.
+struct FakePtpProgram {
+  FakePtpProgram() : socket(std::move(*platform::LocalSocket::bind(path))) {}
+  ~FakePtpProgram() { std::filesystem::remove(path); }
+
+  void serve() {
+    if (silent) return;
+    while (const auto datagram = socket.receive()) {
+      const auto question = ptp::decode_management(datagram->bytes);
+      ASSERT_TRUE(question.ok());
+      ptp::ManagementMessage answer = *question;
+      answer.body.action = static_cast<std::uint8_t>(ptp::ManagementAction::kResponse);
+      if (question->id == ptp::ManagementId::kPortPropertiesNp) {
+        ptp::PortPropertiesNp properties;
+        properties.state = state;
+        properties.timestamping = hardware ? 1 : 0;
+        properties.interface = ptp::PtpText<32>("eth0");
+        answer.data = properties;
+      } else {
+        answer.data = ptp::TimePropertiesDataSet{37, 0x0C, 0xA0};  // PTP timescale, offset valid
+      }
+      (void)socket.send(datagram->sender, ptp::encode_management(answer).view());
+    }
+  }
+
+  std::string path =
+      (std::filesystem::temp_directory_path() / ("ftcs_port_watch_" + std::to_string(::getpid())))
+          .string();
+  platform::LocalSocket socket;
+  PortState state = PortState::kUncalibrated;
+  bool hardware = true;
+  bool silent = false;
+};
+
+struct World {
+  World() {
+    kernel.phc.time_ns = 37e9 + 1e6;
+    kernel.phc_index = 0;
+    kernel.timestamping |=
+        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    options.automatic = true;
+    options.port.socket = program.path;
+    options.duration = Duration::from_ns(30e9);
+    kernel.on_poll = [this] {
+      program.serve();
+      if (on_turn) on_turn();
+    };
+  }
+  [[nodiscard]] double difference() const {
+    return kernel.phc.time_ns - kernel.system.time_ns - 37e9;
+  }
+
+  platform::FakeClocks kernel;
+  Log log{kernel, stdout, 3};
+  PhcOptions options;
+  FakePtpProgram program;
+  std::function<void()> on_turn;
+};
+
+TEST(PortWatch, the_system_clock_follows_the_clock_of_the_port_once_it_receives_time) {
+  World world;
+  bool touched_early = false;
+  world.on_turn = [&] {
+    if (world.kernel.ideal_ns > 5e9) {
+      world.program.state = PortState::kTimeReceiver;
+    } else {
+      touched_early = touched_early || world.kernel.commands > 0;
+    }
+  };
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kSuccess);
+  EXPECT_FALSE(touched_early);
+  EXPECT_NEAR(world.difference(), 0.0, 50.0) << "UTC by the port's own offset";
+}
+
+TEST(PortWatch, a_port_that_stops_receiving_is_not_followed) {
+  World world;
+  int commands = 0;
+  world.program.state = PortState::kTimeReceiver;
+  world.on_turn = [&] {
+    if (world.kernel.ideal_ns > 10e9) world.program.state = PortState::kListening;
+    if (world.kernel.ideal_ns < 12e9) commands = world.kernel.commands;
+  };
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kNotLocked);
+  // The kernel's own status goes on being told, once a second; the rate is left alone.
+  EXPECT_LE(world.kernel.commands - commands, 32);
+  EXPECT_NEAR(world.difference(), 0.0, 1'000.0);
+}
+
+TEST(PortWatch, silence_is_no_state) {
+  World world;
+  auto watch = PortWatch::open(world.options.port);
+  ASSERT_TRUE(watch.ok());
+  world.program.state = PortState::kTimeReceiver;
+  watch->attend(0);
+  world.program.serve();
+  watch->attend(100'000'000);
+  EXPECT_TRUE(watch->is_receiving());
+  EXPECT_EQ(watch->port()->interface, "eth0");
+  EXPECT_EQ(watch->port()->scale.utc_offset, 37);
+  world.program.silent = true;
+  watch->attend(4'000'000'000);
+  EXPECT_TRUE(watch->is_receiving());
+  watch->attend(6'000'000'000);
+  EXPECT_FALSE(watch->port().has_value());
+}
+
+TEST(PortWatch, software_timestamps_leave_nothing_to_do) {
+  World world;
+  world.program.state = PortState::kTimeReceiver;
+  world.program.hardware = false;
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kRuntimeError);
+  EXPECT_EQ(world.kernel.commands, 0);
+}
+
+TEST(PortWatch, waits_for_a_port_as_w_does_and_gives_up_with_the_duration) {
+  World world;
+  world.options.automatic = false;
+  world.options.wait_for_port = true;
+  world.options.source = "/dev/ptp0";
+  world.program.state = PortState::kListening;
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kNotLocked);
+  EXPECT_EQ(world.kernel.commands, 0);
+  world.kernel.held_names.clear();
+  world.program.state = PortState::kTimeTransmitter;
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kSuccess);
+  EXPECT_NEAR(world.difference(), 0.0, 50.0);
+}
+
+}  // namespace
+}  // namespace ftcs::app
