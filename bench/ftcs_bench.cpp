@@ -8,7 +8,7 @@
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  ftcs::bench::for_each_case([]<class Case>(const char* name, const Case&) {
+  ftcs::bench::for_each_case([]<class Case>(const char* name, std::type_identity<Case>) {
     benchmark::RegisterBenchmark(name, [](benchmark::State& state) {
       Case subject;
       for (auto _ : state) benchmark::DoNotOptimize(subject.step());

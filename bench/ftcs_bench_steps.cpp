@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   const std::string_view wanted = list ? "" : argv[1];
   const long long count = list ? 0 : std::atoll(argv[2]);
   bool found = list;
-  ftcs::bench::for_each_case([&]<class Case>(const char* name, const Case&) {
+  ftcs::bench::for_each_case([&]<class Case>(const char* name, std::type_identity<Case>) {
     if (list) std::puts(name);
     if (name != wanted) return;
     found = true;

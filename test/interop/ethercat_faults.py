@@ -35,8 +35,8 @@ def run_cell(folder, port, servo, segment_flags, run_flags, stalls):
                                + segment_flags, stdout=subprocess.DEVNULL)
     time.sleep(0.5)
     main = subprocess.Popen([FTCS, "ethercat", "run", "--udp", f"127.0.0.1:{port}", "--drives", "8", "--servo", servo, "-q",
-                             "--gate", f"{GATE_NS}ns", "--drift-pulses", "2000", "--duration", str(RUN_S), "--json", run_json,
-                             "--csv", cycles] + run_flags, stderr=subprocess.PIPE, text=True)
+                             "--gate", f"{GATE_NS}ns", "--lost-frame-limit", "500", "--drift-pulses", "2000", "--duration", str(RUN_S),
+                             "--json", run_json, "--csv", cycles] + run_flags, stderr=subprocess.PIPE, text=True)
     if stalls:
         time.sleep(FAULT_AT_S)
         for _ in range(5):

@@ -34,7 +34,7 @@ ip netns exec "$segment" "$ftcs" ethercat-segment -i ev1 --priority 70 > "$folde
 pid=$!
 sleep 1
 run() {
-  ip netns exec "$main" "$ftcs" ethercat run -i ev0 --drives 8 --servo "$1" --duration "$2" -q --json "$folder/$1.json"
+  ip netns exec "$main" "$ftcs" ethercat run -i ev0 --drives 8 --servo "$1" --lost-frame-limit 500 --duration "$2" -q --json "$folder/$1.json"
 }
 run ftcs "$seconds" || echo "ftcs: exit code $?"
 run adaptive 8 || echo "adaptive: exit code $?"

@@ -9,6 +9,7 @@
 
 #include "apps/ftcs/ethercat/cycle_laws.h"
 #include "apps/ftcs/ethercat/local_segment.h"
+#include "apps/ftcs/ethercat/run_histograms.h"
 #include "test/support/forbid_allocation.h"
 
 namespace ftcs::app {
@@ -55,6 +56,25 @@ TEST_P(OnLoopback, the_cyclic_path_touches_no_heap) {
   guard.reset();
   EXPECT_GE(runner_->figures().cycles, 499U);
   EXPECT_GT(runner_->figures().working_counter_right, 0U);
+}
+
+TEST(RunHistogram, counts_every_traced_cycle_and_shows_what_is_not_empty) {
+  RunFigures figures;
+  for (int i = 0; i < 10'000; ++i) {
+    RunPoint point;
+    point.lateness_us = static_cast<float>(i % 100);
+    figures.trace.push_back(point);
+  }
+  figures.trace.back().lateness_us = 1e6F;  // one stall does not squeeze the rest
+  const Histogram bins = run_histogram(figures, &RunPoint::lateness_us);
+  EXPECT_LE(bins.upper, 100.0);
+  EXPECT_EQ(bins.above, 1U);
+  std::uint64_t inside = 0;
+  for (const std::uint64_t count : bins.counts) inside += count;
+  EXPECT_EQ(inside + bins.below + bins.above, 10'000U);
+  EXPECT_EQ(histogram_bars(bins).find(' '), std::string::npos);
+  EXPECT_TRUE(run_histogram(RunFigures{}, &RunPoint::lateness_us).counts.empty());
+  EXPECT_EQ(histogram_bars({}), "");
 }
 
 }  // namespace
