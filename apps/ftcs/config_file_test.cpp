@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/ftcs/ptp_option_table.h"
+#include "apps/ftcs/ptp_presets.h"
+
 namespace ftcs::app {
 namespace {
 
@@ -85,6 +88,50 @@ TEST(ConfigFile, a_missing_file_is_named) {
   PtpOptions options;
   EXPECT_EQ(read_config_file("/nonexistent/ptp.conf", options).value_or(""),
             "/nonexistent/ptp.conf: No such file or directory");
+}
+
+TEST(Presets, gptp_is_an_end_station_of_802_1as) {
+  PtpOptions options;
+  EXPECT_EQ(apply_preset(options, "gptp").value_or(""), "");
+  EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kEthernet);
+  EXPECT_EQ(options.socket.primary_mac, options.socket.peer_mac);
+  EXPECT_TRUE(options.peer_to_peer());
+  EXPECT_TRUE(options.peer_delay_config().capability_needed);
+  EXPECT_EQ(options.peer_delay_config().highest, Nanoseconds{800});
+  EXPECT_EQ(options.major_sdo_id, 1);
+  EXPECT_EQ(options.log_sync_interval, -3);
+  EXPECT_EQ(options.sync_receipt_timeout, 3);
+  EXPECT_TRUE(options.follow_up_info && options.path_trace && options.assume_two_step);
+  // As ptp4l's asCapable true; and what is set later wins.
+  EXPECT_EQ(apply_setting(options, "asCapable", "true").value_or(""), "");
+  EXPECT_FALSE(options.peer_delay_config().capability_needed);
+}
+
+TEST(Presets, default_profiles_differ_in_the_delay_mechanism_and_ask_nothing_of_a_neighbour) {
+  for (const bool peer_to_peer : {false, true}) {
+    PtpOptions options;
+    EXPECT_EQ(apply_preset(options, peer_to_peer ? "default-p2p" : "default-e2e").value_or(""), "");
+    EXPECT_EQ(options.peer_to_peer(), peer_to_peer);
+    EXPECT_FALSE(options.peer_delay_config().capability_needed);
+    EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kUdpIpv4);
+  }
+  PtpOptions options;
+  EXPECT_EQ(apply_preset(options, "g8275").value_or(""),
+            "unknown preset 'g8275' (known: default-e2e, default-p2p, gptp)");
+}
+
+TEST(Settings, transports_addresses_and_limits_have_ptp4ls_names_and_units) {
+  PtpOptions options;
+  EXPECT_EQ(apply_setting(options, "ptp_dst_mac", "01:80:C2:00:00:0E").value_or(""), "");
+  EXPECT_EQ(options.socket.primary_mac, (platform::MacAddress{1, 0x80, 0xC2, 0, 0, 0x0E}));
+  EXPECT_EQ(apply_setting(options, "udp6_scope", "0x05").value_or(""), "");
+  EXPECT_EQ(options.socket.ipv6_scope, 5);
+  EXPECT_EQ(apply_setting(options, "neighborPropDelayThresh", "1500").value_or(""), "");
+  EXPECT_EQ(options.peer_delay.highest, Nanoseconds{1500});
+  EXPECT_EQ(apply_setting(options, "delayAsymmetry", "-40").value_or(""), "");
+  EXPECT_EQ(options.delay_asymmetry, Nanoseconds{-40});
+  EXPECT_NE(apply_setting(options, "udp6_scope", "16"), std::nullopt);
+  EXPECT_NE(apply_setting(options, "logMinPdelayReqInterval", "8"), std::nullopt);
 }
 
 }  // namespace

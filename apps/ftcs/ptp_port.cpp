@@ -115,6 +115,16 @@ bool PtpPort::open_management() {
   return true;
 }
 
+void PtpPort::wait_until(FreeRunningTime underlying) {
+  // What came before a timer was due is handled before it, even when this process was held up; but
+  // no more than this, so that a flood holds up no timer.
+  constexpr int kMostBeforeTimers = 16;
+  for (int handled = 0; handled < kMostBeforeTimers; ++handled) {
+    if (!transport_.wait_until(underlying)) return;
+    underlying = timestamps_->source().now();
+  }
+}
+
 void PtpPort::perform(const ptp::ActionList& actions) {
   for (const ptp::Action& action : actions) {
     if (const auto* message = std::get_if<ptp::SendMessage>(&action)) {

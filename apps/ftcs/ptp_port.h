@@ -55,7 +55,7 @@ class PtpPort : private platform::TransportHandler {
   /// Opens where timestamps come from, and waits for them; the network's sockets, unless a port has
   /// none. `underlying`: on the oscillator without skew.
   [[nodiscard]] virtual std::optional<platform::OsError> open_source() { return transport_.open(); }
-  virtual void wait_until(FreeRunningTime underlying) { transport_.wait_until(underlying); }
+  virtual void wait_until(FreeRunningTime underlying);
   /// Who answers the management socket; null: nobody, and there is none.
   [[nodiscard]] virtual Managed* managed() { return nullptr; }
   /// Once per turn of the loop.

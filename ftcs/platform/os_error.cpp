@@ -37,7 +37,7 @@ const char* reason(const OsError& error) {
     case OsErrorKind::kInterfaceDown:
       return "the interface is down";
     case OsErrorKind::kNoAddress:
-      return "no IPv4 address";
+      return "no IP address of the version asked for";
     case OsErrorKind::kBadAddress:
       return "not an IPv4 address";
     case OsErrorKind::kNotPermitted:

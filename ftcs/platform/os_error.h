@@ -10,8 +10,8 @@ namespace ftcs::platform {
 enum class OsErrorKind : std::uint8_t {
   kNoSuchInterface,  ///< the network interface does not exist (any more)
   kInterfaceDown,    ///< it exists, but is not up
-  kNoAddress,        ///< it has no IPv4 address
-  kBadAddress,       ///< not an IPv4 address
+  kNoAddress,        ///< it has no IPv4 or IPv6 address, whichever is needed
+  kBadAddress,       ///< not an address of the kind asked for
   kNotPermitted,     ///< a capability is missing (a port below 1024, a device, a NIC setting)
   kAddressInUse,     ///< another program holds the port
   kTimestampingUnsupported,  ///< the requested kind of timestamp is not to be had

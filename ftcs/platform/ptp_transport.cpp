@@ -58,14 +58,14 @@ std::optional<OsError> PtpTransport::note(std::optional<OsError> error) {
   return error;
 }
 
-void PtpTransport::wait_until(FreeRunningTime deadline) {
+bool PtpTransport::wait_until(FreeRunningTime deadline) {
   const FreeRunningTime now = clock_.source().now();
   if (suspect_ || now >= next_check_) check_link(now);
   report_overdue();
-  poll_sockets(std::min(deadline, next_check_));
+  return poll_sockets(std::min(deadline, next_check_));
 }
 
-void PtpTransport::poll_sockets(FreeRunningTime deadline) {
+bool PtpTransport::poll_sockets(FreeRunningTime deadline) {
   // The sockets keep the first two places, watched ones follow; a negative descriptor is ignored.
   std::array<pollfd, 2 + kLargestWatch> descriptors{{{-1, 0, 0}, {-1, 0, 0}}};
   std::size_t count = 2;
@@ -77,7 +77,7 @@ void PtpTransport::poll_sockets(FreeRunningTime deadline) {
   }
   for (const int descriptor : watched_) descriptors[count++] = {descriptor, POLLIN, 0};
   const int timeout = poll_timeout_ms(deadline - clock_.source().now());
-  if (kernel_.poll({descriptors.data(), count}, timeout) <= 0) return;
+  if (kernel_.poll({descriptors.data(), count}, timeout) <= 0) return false;
   constexpr auto kTransmitted = static_cast<short>(POLLPRI | POLLERR);
   if ((descriptors[0].revents & kTransmitted) != 0) {
     if (const auto transmitted = socket_->receive_transmitted()) {
@@ -91,6 +91,7 @@ void PtpTransport::poll_sockets(FreeRunningTime deadline) {
   for (std::size_t i = 2; i < count; ++i) {
     if ((descriptors[i].revents & POLLIN) != 0) handler_.on_readable(descriptors[i].fd);
   }
+  return true;
 }
 
 void PtpTransport::receive(Channel channel) {

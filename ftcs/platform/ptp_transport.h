@@ -51,8 +51,9 @@ class PtpTransport {
   std::optional<OsError> send_to(Channel channel, std::span<const std::uint8_t> bytes,
                                  const SocketAddress& to);
   /// Handles what arrives until `deadline` (on the free-running clock), or returns early after an
-  /// event or a signal, and at the latest after a quarter of a second.
-  void wait_until(FreeRunningTime deadline);
+  /// event or a signal, and at the latest after a quarter of a second. True if there was something
+  /// to handle: more may be waiting behind it.
+  bool wait_until(FreeRunningTime deadline);
 
   /// As wait_until(), for the watched descriptors alone: without sockets of its own, and without
   /// trying to open any.
@@ -70,7 +71,7 @@ class PtpTransport {
 
  private:
   std::optional<OsError> note(std::optional<OsError> error);
-  void poll_sockets(FreeRunningTime deadline);
+  bool poll_sockets(FreeRunningTime deadline);
   void receive(Channel channel);
   void report_overdue();
   void check_link(FreeRunningTime now);

@@ -6,7 +6,10 @@
 //
 //   step    = advance (1 octet, units of 8 ms), input (1 octet), operands
 //   message = source, sequence, flags, correction, interval, time (1 octet each)
+//
+// The last octet chooses the receiver's profile.
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -29,10 +32,7 @@ constexpr int kTimersAtOnce = 64;
 class Script {
  public:
   explicit Script(std::span<const std::uint8_t> octets) : octets_(octets), reader_(octets) {
-    TimeReceiverConfig config;
-    config.port = kUs;
-    config.seed = 1;
-    receiver_ = TimeReceiver(config);
+    receiver_ = TimeReceiver(profile(octets.empty() ? std::uint8_t{0} : octets.back()));
     check(receiver_.start(now_));
   }
 
@@ -45,10 +45,26 @@ class Script {
   }
 
  private:
+  static TimeReceiverConfig profile(std::uint8_t bits) {
+    TimeReceiverConfig config;
+    config.port = kUs;
+    config.seed = 1;
+    if ((bits & 1) != 0) config.delay_mechanism = DelayMechanism::kPeerToPeer;
+    config.peer_delay.capability_needed = (bits & 3) == 3;
+    config.fast_start = (bits & 4) != 0;
+    config.hybrid = (bits & 8) != 0;
+    config.assume_two_step = (bits & 16) != 0;
+    config.sync_receipt_timeout = (bits & 32) != 0 ? 3 : 0;
+    if ((bits & 64) != 0) {
+      require(config.acceptable.add(ClockIdentity::from_mac({2, 0, 0, 0, 0, 2})), "there is room");
+    }
+    return config;
+  }
+
   std::uint8_t octet() { return reader_.read<std::uint8_t>(); }
 
   void step() {
-    switch (octet() % 16) {
+    switch (octet() % 24) {
       case 0:
         return check(receiver_.on_link_down(now_));
       case 1:
@@ -59,29 +75,39 @@ class Script {
         return check(receiver_.on_servo_unlocked(now_));
       case 4:
         return check(
-            receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, octet()}, now_));
+            receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, octet(), {}}, now_));
       case 5:
       case 6:
-        return check(receiver_.on_transmit_timestamp({MessageType::kDelayReq, last_request_},
-                                                     stamp(), now_));
+        return check(receiver_.on_transmit_timestamp(last_event_, stamp(), now_));
       case 7:
         return raw_message();
       case 8:
       case 9:
         return general(announce());
       case 10:
-      case 11: {
-        const auto bytes = encode(message(Sync{time()}));
-        if (bytes) check(receiver_.on_event_message(bytes->view(), stamp(), now_));
-        return;
-      }
+      case 11:
+        return event(message(Sync{time()}));
       case 12:
       case 13:
-        return general(message(FollowUp{time()}));
+        return general(message(follow_up()));
       case 14:
         return general(message(DelayResp{time(), octet() < 250 ? kUs : port()}, true));
-      default:
+      case 15:
         return general(message(Management{}));
+      case 16:
+        return event(message(PdelayReq{time()}));
+      case 17:
+      case 18:
+        return event(message(PdelayResp{time(), octet() < 250 ? kUs : port()}, true));
+      case 19:
+      case 20:
+        return general(message(PdelayRespFollowUp{time(), octet() < 250 ? kUs : port()}, true));
+      case 21:
+        return check(receiver_.on_transmit_timestamp_missing(last_event_, now_));
+      case 22:
+        return event(message(Sync{time()}));
+      default:
+        return check(receiver_.on_timer(now_));
     }
   }
 
@@ -91,6 +117,19 @@ class Script {
     for (std::size_t i = 0; i < size; ++i) bytes[i] = octet();
     check(receiver_.on_event_message({bytes.data(), size}, stamp(), now_));
     check(receiver_.on_general_message({bytes.data(), size}, now_));
+  }
+  void event(const Message& message) {
+    const auto bytes = encode(message);
+    if (bytes) check(receiver_.on_event_message(bytes->view(), stamp(), now_));
+  }
+  FollowUp follow_up() {
+    FollowUp body{time()};
+    const std::uint8_t choice = octet();
+    body.has_information = choice > 127;
+    body.information.cumulative_scaled_rate_offset = std::int32_t{choice} << 23;
+    body.information.gm_time_base_indicator = choice % 3;
+    body.information.last_gm_phase_change = Duration::from_scaled_ns(std::int64_t{choice} << 55);
+    return body;
   }
   void general(const Message& message) {
     const auto bytes = encode(message);
@@ -153,6 +192,12 @@ class Script {
   void check(const ActionList& actions) {
     for (const Action& action : actions) {
       if (const auto* emit = std::get_if<EmitPair>(&action)) check_pair(emit->pair);
+      if (const auto* delay = std::get_if<EmitPeerDelay>(&action)) {
+        ++peer_delays_;
+        require(abs(delay->mean_link_delay) <= Duration{2 * kMaximumPeerDelay},
+                "a peer delay is one");
+        require(std::abs(delay->neighbor_rate_ratio.deviation()) < 0.1, "a rate is one");
+      }
       if (const auto* change = std::get_if<PortStateChanged>(&action)) {
         require(change->from != change->to, "a change changes something");
         require(change->from == state_, "each change starts where the last one ended");
@@ -162,9 +207,13 @@ class Script {
         const auto sent = decode(send->bytes.view());
         require(sent.ok() && sent->header.source == kUs,
                 "what it sends is well-formed and its own");
-        require(type_of(sent->body) == MessageType::kDelayReq,
-                "a receiver only asks for the delay");
-        last_request_ = send->sequence_id;
+        const MessageType type = type_of(sent->body);
+        const bool request = type == MessageType::kDelayReq || type == MessageType::kPdelayReq;
+        require(
+            request || type == MessageType::kPdelayResp || type == MessageType::kPdelayRespFollowUp,
+            "a receiver only asks for the delay, and answers its neighbour");
+        if (request) last_request_ = send->sequence_id;
+        if (is_event(type)) last_event_ = send->id();
       }
     }
     const bool following = receiver_.state() == PortState::kUncalibrated ||
@@ -190,6 +239,7 @@ class Script {
     require(counters[Counter::kActionsDropped] == 0, "the list holds all actions");
     require(counters[Counter::kForwardPairs] == forward_, "forward pairs are counted");
     require(counters[Counter::kBackwardPairs] == backward_, "backward pairs are counted");
+    require(counters[Counter::kPeerDelays] == peer_delays_, "peer delays are counted");
     before_ = counters;
   }
 
@@ -200,8 +250,10 @@ class Script {
   PortState state_ = PortState::kInitializing;
   std::uint16_t sequence_ = 0;
   std::uint16_t last_request_ = 0;
+  EventId last_event_{};
   std::uint64_t forward_ = 0;
   std::uint64_t backward_ = 0;
+  std::uint64_t peer_delays_ = 0;
   Counters before_;
 };
 
