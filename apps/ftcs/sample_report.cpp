@@ -127,7 +127,7 @@ std::string csv_line(const SampleRecord& record) {
   return line;
 }
 
-void RunningStatistics::add(double value) noexcept {
+void SampleStatistics::add(double value) noexcept {
   ++count_;
   const double distance = value - mean_;
   mean_ += distance / static_cast<double>(count_);
@@ -136,11 +136,11 @@ void RunningStatistics::add(double value) noexcept {
   largest_ = std::max(largest_, std::abs(value));
 }
 
-double RunningStatistics::deviation() const noexcept {
+double SampleStatistics::deviation() const noexcept {
   return count_ == 0 ? 0.0 : std::sqrt(squares_ / static_cast<double>(count_));
 }
 
-double RunningStatistics::rms() const noexcept {
+double SampleStatistics::rms() const noexcept {
   return count_ == 0 ? 0.0 : std::sqrt(sum_of_squares_ / static_cast<double>(count_));
 }
 

@@ -35,8 +35,10 @@ struct SampleRecord {
 [[nodiscard]] std::string csv_header();
 [[nodiscard]] std::string csv_line(const SampleRecord& record);
 
-/// Mean, standard deviation and greatest magnitude of what was added.
-class RunningStatistics {
+/// Mean, standard deviation (divisor n, as ptp4l) and greatest magnitude of what was added. Its
+/// name differs from that of ftcs::RunningStatistics, which it would hide from other headers of
+/// this folder.
+class SampleStatistics {
  public:
   void add(double value) noexcept;
   void reset() noexcept { *this = {}; }
@@ -64,9 +66,9 @@ class SampleSummary {
   [[nodiscard]] std::string text() const;
 
  private:
-  RunningStatistics offset_;
-  RunningStatistics frequency_;
-  RunningStatistics delay_;
+  SampleStatistics offset_;
+  SampleStatistics frequency_;
+  SampleStatistics delay_;
 };
 
 }  // namespace ftcs::app

@@ -69,8 +69,8 @@ TEST(SampleReport, the_summary_is_rms_and_mean_and_deviation) {
   EXPECT_EQ(summary.text(), "rms    4 max    4 freq +50000 +/-   0 delay  2500 +/-   0");
 }
 
-TEST(RunningStatistics, agrees_with_the_definition) {
-  RunningStatistics statistics;
+TEST(SampleStatistics, agrees_with_the_definition) {
+  SampleStatistics statistics;
   for (const double value : {1.0, 2.0, -4.0}) statistics.add(value);
   EXPECT_DOUBLE_EQ(statistics.mean(), -1.0 / 3.0);
   EXPECT_DOUBLE_EQ(statistics.rms(), std::sqrt(7.0));
