@@ -178,7 +178,8 @@ ServoSnapshot BasicAdaptiveServo<Grid>::describe(const Belief& belief,
   snapshot.path_delay = Duration::from_ns(estimator_.estimate().d / free_per_reference);
   snapshot.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
   snapshot.offset_gain = estimator_.gain();
-  snapshot.offset_sigma_ns = estimator_.offset_sigma_ns(belief.cycles);
+  const double sigma = estimator_.offset_sigma_ns(belief.cycles);
+  snapshot.offset_sigma_ns = std::sqrt(sigma * sigma + order_.tick_variance_ns2());
   snapshot.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
   snapshot.path_delay_sigma_ns = estimator_.delay_sigma_ns();
   snapshot.timestamp_noise_ns = estimator_.scale();

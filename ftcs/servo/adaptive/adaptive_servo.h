@@ -63,12 +63,12 @@ class BasicAdaptiveServo {
   adaptive::Steering steering_;
   adaptive::IntervalMeter meter_;
   adaptive::MessageOrder order_{};
-  bool started_ = false;
   Duration base_{};             ///< first z: keeps the states small
   FreeRunningTime previous_{};  ///< of the last message
   ReferenceTime event_{};       ///< reference time to which the last message belongs
   Belief latest_{};
   ServoState state_ = ServoState::kUnlocked;
+  bool started_ = false;
 };
 
 using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid>;

@@ -38,10 +38,6 @@ constexpr double kHopeless = 40.0;
 /// Twice nats per place behind the starting model: with three messages every model is as likely as
 /// the next, and the wildest would take the noise for motion. Forgotten after a dozen messages.
 constexpr double kWildnessCost = 1.0;
-/// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
-/// then the calmer of two models that explain the same is the better bet. More than this costs
-/// oscillators that do wander slowly.
-constexpr double kCalmGain = 0.12;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
@@ -318,7 +314,7 @@ void Estimator<Grid>::choose() noexcept {
   for (std::size_t i = 0; i < kSize; ++i) {
     const double places = static_cast<double>(i) - static_cast<double>(Grid::kStart);
     cost[i] = weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) +
-              logs_[i] + (places > 0.0 ? kWildnessCost : kCalmGain) * places;
+              logs_[i] + kWildnessCost * std::max(places, 0.0);
   }
   best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
   double total = 0.0;
@@ -356,7 +352,7 @@ void Estimator<Grid>::follow_scale() noexcept {
     // without evidence any other might be chosen.
     forget_evidence();
     const Estimate coped = bank_.estimate(best_);
-    bank_.for_each([&coped](Estimate& e) { e = coped; });
+    if (residuals_.full()) bank_.for_each([&coped](Estimate& e) { e = coped; });
   }
   // Fourth root of both directions' variances: the scale is their geometric mean.
   double learnt = 1.0;
@@ -435,12 +431,15 @@ double Estimator<Grid>::widening() const noexcept {
 }
 
 /// Where the floor of a queueing delay lies is known to a few per cent of its tail only; equal
-/// errors of both directions cancel in the offset.
+/// errors of both directions cancel in the offset. While it is open whether there is a queue at
+/// all, the floor may be off by the whole tail.
 template <class Grid>
 double Estimator<Grid>::floor_doubt_ns() const noexcept {
-  const double difference =
-      two_way() ? (shape_[0].tail - shape_[1].tail) / 2.0 : shape_[0].tail + shape_[1].tail;
-  return kFloorDoubt * scale_ * difference;
+  const double share = two_way() ? 0.5 : 1.0;
+  const double known = kFloorDoubt * (shape_[0].tail - (two_way() ? 1.0 : -1.0) * shape_[1].tail);
+  const double ahead = learner_[0].tail_doubt() * shape_[0].tail;
+  const double back = learner_[1].tail_doubt() * shape_[1].tail;
+  return scale_ * share * std::sqrt(known * known + ahead * ahead + back * back);
 }
 
 template <class Grid>

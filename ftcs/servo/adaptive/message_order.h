@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/servo/adaptive/tick_meter.h"
 #include "ftcs/servo/servo.h"
 #include "ftcs/time/timestamp_pair.h"
 
@@ -25,6 +26,7 @@ class MessageOrder {
     Side& side = sides_[index_of(message.direction)];
     if (!side.seen || newer(pair, side.latest)) {
       jumped_ = side.seen && jump(side.latest, pair);
+      if (side.seen) follow_ticks(side.latest, pair);
       side = {pair, pair, true, 0};
       return Verdict::kNews;
     }
@@ -36,7 +38,7 @@ class MessageOrder {
       side.candidate = pair;
     }
     if (side.refused >= kRefusals) {
-      sides_ = {};
+      reset();
       side = {pair, pair, true, 0};
       return Verdict::kNewEpoch;
     }
@@ -44,10 +46,14 @@ class MessageOrder {
         pair.reference <= side.latest.reference && pair.free_running <= side.latest.free_running;
     return older ? Verdict::kDuplicate : Verdict::kImplausible;
   }
-  void reset() noexcept { sides_ = {}; }
+  void reset() noexcept { *this = MessageOrder{}; }
   /// Whether one clock has jumped against the other before the latest news: their advances since
   /// the message before, of the same direction, differ by more than half.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
+  /// Variance that the steps of both clocks' stamps leave open, ns^2.
+  [[nodiscard]] double tick_variance_ns2() const noexcept {
+    return reference_tick_.variance_ns2() + free_running_tick_.variance_ns2();
+  }
 
  private:
   /// Whole nanoseconds suffice to tell two messages apart.
@@ -82,7 +88,16 @@ class MessageOrder {
     return std::abs(reference - free) > 0.5 * std::max(reference, free);
   }
 
+  void follow_ticks(const Stamps& from, const Stamps& to) noexcept {
+    reference_tick_.observe(difference(from.reference, to.reference));
+    free_running_tick_.observe(difference(from.free_running, to.free_running));
+  }
+  [[nodiscard]] static std::uint64_t difference(std::int64_t from, std::int64_t to) noexcept {
+    return static_cast<std::uint64_t>(to) - static_cast<std::uint64_t>(from);
+  }
+
   std::array<Side, 2> sides_{};
+  TickMeter reference_tick_{}, free_running_tick_{};
   bool jumped_ = false;
 };
 

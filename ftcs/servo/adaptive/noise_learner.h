@@ -33,7 +33,10 @@ class NoiseLearner {
   bool learn(const NoiseSample& sample, const DelayShape& shape) noexcept;
   void restart() noexcept { *this = NoiseLearner{}; }
   /// The reference point of the delay moved by `shift` ns (mean to floor or back).
-  void move_mean(double shift) noexcept { mean_ += shift; }
+  void move_mean(double shift) noexcept {
+    mean_ += shift;
+    body_mean_ += static_cast<float>(shift);
+  }
 
   [[nodiscard]] bool mature() const noexcept { return count_ >= kMature; }
   [[nodiscard]] double count() const noexcept { return count_; }
@@ -41,6 +44,9 @@ class NoiseLearner {
   [[nodiscard]] bool has_tail() const noexcept { return has_tail_; }
   /// Decides normal or late, with hysteresis, and returns the shape in ns (scale 1).
   [[nodiscard]] DelayShape decide() noexcept;
+  /// Probability, roughly, that a learnt tail is none, and the floor of the delay not where it
+  /// says.
+  [[nodiscard]] double tail_doubt() const noexcept;
 
  private:
   static constexpr std::array<double, 3> kTailShares = {0.99, 0.9, 0.75};
@@ -49,7 +55,11 @@ class NoiseLearner {
   double count_ = 0.0;
   double mean_ = 0.0;
   double variance_ = 0.0;
-  std::array<double, 3> ratio_{};  ///< ln likelihood, late against normal
+  std::array<float, 3> ratio_{};  ///< ln likelihood, late against normal
+  float spoilt_ = 0.0F;           ///< the same, normal with outliers against normal
+  float body_mean_ = 0.0F;        ///< slow means of the window's median and its deviation
+  float body_deviation_ = 0.0F;
+  float lead_ = 0.0F;  ///< of queueing over the better alternative, nats
   bool has_tail_ = false;
 };
 
@@ -64,6 +74,7 @@ class NoiseLearner<0> {
   [[nodiscard]] double count() const noexcept { return 0.0; }
   [[nodiscard]] double variance() const noexcept { return 1.0; }
   [[nodiscard]] DelayShape decide() noexcept { return {}; }
+  [[nodiscard]] double tail_doubt() const noexcept { return 0.0; }
 };
 
 extern template class NoiseLearner<32>;
