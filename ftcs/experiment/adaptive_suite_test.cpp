@@ -60,9 +60,14 @@ std::vector<Scenario> suite() {
   return scenarios;
 }
 
+const std::vector<Scenario>& scenarios() {
+  static const std::vector<Scenario> all = suite();
+  return all;
+}
+
 /// Run once for both tests.
 const SweepResult& sweep() {
-  static const SweepResult result = run_sweep(suite(), {}, {});
+  static const SweepResult result = run_sweep(scenarios(), {}, {});
   return result;
 }
 
@@ -77,6 +82,13 @@ double mean(const ServoResult& servo, double RunFigures::*figure) {
   return sum / count;
 }
 
+/// Below the step of the timestamps any error is luck.
+double floor_of(const Scenario& scenario) {
+  const double steps =
+      std::hypot(scenario.world.nodes.front().tick.ns(), scenario.world.reference_tick.ns());
+  return std::max(steps / std::sqrt(12.0), 0.1);
+}
+
 /// A constant difference of the two directions' delays cannot be seen by any servo.
 bool has_unknowable_asymmetry(const std::string& scenario) {
   return scenario.find("asymmetry") != std::string::npos;
@@ -85,7 +97,9 @@ bool has_unknowable_asymmetry(const std::string& scenario) {
 TEST(AdaptiveSuite, is_never_worse_than_plain_ftcs_by_more_than_a_tenth) {
   std::printf("%-30s %9s %9s %9s | first ten %9s %9s %9s\n", "RMS true error, ns, median",
               "adaptive", "p = 1", "ftcs", "adaptive", "p = 1", "ftcs");
-  for (const ScenarioResult& scenario : sweep().scenarios) {
+  for (std::size_t number = 0; number < scenarios().size(); ++number) {
+    const ScenarioResult& scenario = sweep().scenarios[number];
+    const double floor = floor_of(scenarios()[number]);
     const auto rms = [&](std::size_t i) {
       return scenario.servos[i].median(&RunFigures::rms_time_error_ns);
     };
@@ -95,12 +109,13 @@ TEST(AdaptiveSuite, is_never_worse_than_plain_ftcs_by_more_than_a_tenth) {
     std::printf("%-30s %9.2f %9.2f %9.2f |           %9.1f %9.1f %9.1f\n",
                 scenario.scenario.c_str(), rms(0), rms(1), rms(2), ten(0), ten(1), ten(2));
     for (const std::size_t plain : {1U, 2U}) {
-      EXPECT_LE(rms(0), 1.1 * rms(plain) + 0.1) << scenario.scenario;
+      EXPECT_LE(rms(0), std::max(1.1 * rms(plain), floor)) << scenario.scenario;
       // At the end of a chain all clocks start at once; what the last one follows is still moving,
       // and the less a servo believes of it the better. p = 1 is the fair comparison there.
       const bool chain = scenario.scenario.find("chain") != std::string::npos;
       if (chain && plain == 2) continue;
-      EXPECT_LE(ten(0), 1.1 * ten(plain) + 0.1) << scenario.scenario << ", first ten cycles";
+      EXPECT_LE(ten(0), std::max(1.1 * ten(plain), floor))
+          << scenario.scenario << ", first ten cycles";
     }
   }
 }

@@ -38,6 +38,10 @@ constexpr double kHopeless = 40.0;
 /// Twice nats per place behind the starting model: with three messages every model is as likely as
 /// the next, and the wildest would take the noise for motion. Forgotten after a dozen messages.
 constexpr double kWildnessCost = 1.0;
+/// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
+/// then the calmer of two models that explain the same is the better bet. More than this costs
+/// oscillators that do wander slowly.
+constexpr double kCalmGain = 0.06;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
@@ -314,7 +318,7 @@ void Estimator<Grid>::choose() noexcept {
   for (std::size_t i = 0; i < kSize; ++i) {
     const double places = static_cast<double>(i) - static_cast<double>(Grid::kStart);
     cost[i] = weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) +
-              logs_[i] + kWildnessCost * std::max(places, 0.0);
+              logs_[i] + (places > 0.0 ? kWildnessCost : kCalmGain) * places;
   }
   best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
   double total = 0.0;

@@ -30,6 +30,9 @@ constexpr double kDoubt = 2.0;
 /// One window's median and median deviation are too noisy to judge by.
 constexpr double kBodyMemory = 200.0;
 constexpr double kTailOn = 8.0;
+/// Nats beyond it that divide the doubt by e. Messages are not as independent as nats assume:
+/// bursts have led by a dozen.
+constexpr double kSureness = 16.0;
 constexpr double kTailOff = -12.0;
 
 double normal_log_density(double w) noexcept { return -0.5 * w * w - 0.9189385332046727; }
@@ -106,7 +109,8 @@ DelayShape NoiseLearner<Window>::decide() noexcept {
 
 template <std::size_t Window>
 double NoiseLearner<Window>::tail_doubt() const noexcept {
-  return has_tail_ ? std::min(1.0, std::exp(-static_cast<double>(lead_) / kTailOn)) : 0.0;
+  const double sure = static_cast<double>(lead_) - kTailOn;
+  return has_tail_ ? std::min(1.0, std::exp(-sure / kSureness)) : 0.0;
 }
 
 template class NoiseLearner<32>;
