@@ -76,7 +76,20 @@ void read_kalman_noise(TomlTable& table, baseline::KalmanNoise& noise) {
   if (const auto v = table.ratio_per_root_second("random_walk_fm")) noise.random_walk_fm_1s = *v;
 }
 
+/// What the actuator can do and its users bear, as far as the adaptive servo is to know it.
+void read_actuator(TomlTable& table, SteeringLimits& steering) {
+  if (const auto v = table.ratio("rate_change", {0.0, 1.0})) steering.rate_change = *v;
+  if (const auto v = table.ratio("rate_granularity", {0.0, 0.1})) steering.rate_granularity = *v;
+  if (const auto v = table.duration("time_granularity", kNotNegative)) {
+    steering.time_granularity = Nanoseconds{v->rounded_ns()};
+  }
+  if (const auto v = table.duration("latency", kNotNegative)) {
+    steering.latency = Nanoseconds{v->rounded_ns()};
+  }
+}
+
 void read_parameters(TomlTable& table, ServoConfig& config) {
+  read_actuator(table, config.adaptive.steering);
   if (const auto v = table.number("offset_gain", {0.0, 1.0})) config.ftcs.offset_gain = *v;
   if (const auto v = table.duration("band_enter", kNotNegative))
     config.ftcs.converged_band.enter = *v;

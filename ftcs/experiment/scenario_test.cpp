@@ -140,5 +140,37 @@ TEST(Sweep, octets_and_stamps_agree) {
   EXPECT_NEAR(a.rms_time_error_ns, b.rms_time_error_ns, 0.5 * a.rms_time_error_ns);
 }
 
+TEST(Scenario, the_adaptive_servo_is_told_what_the_actuator_can_do) {
+  const auto scenarios = parse_scenarios(R"(
+title = "a drive that bears small steps of the rate only"
+[run]
+sync_interval = "125 ms"
+cycles = 400
+measure_from = 200
+seeds = 1
+[clock]
+initial_offset = "1 ms"
+skew = "50 ppm"
+[path]
+delay = "10 us"
+jitter = { kind = "gaussian", sigma = "100 ns" }
+[[servo]]
+kind = "adaptive"
+name = "gentle"
+rate_change = "10 ppm"
+rate_granularity = "1 ppb"
+time_granularity = "1 us"
+latency = "50 us"
+)",
+                                         "gentle.toml");
+  const Scenario& scenario = scenarios.front();
+  const SteeringLimits& limits = scenario.servos.front().config.adaptive.steering;
+  EXPECT_DOUBLE_EQ(limits.rate_change, 1e-5);
+  EXPECT_DOUBLE_EQ(limits.rate_granularity, 1e-9);
+  EXPECT_EQ(limits.time_granularity, Nanoseconds{1'000});
+  EXPECT_EQ(limits.latency, Nanoseconds{50'000});
+  EXPECT_LT(run_scenario(scenario, scenario.servos.front(), 1).rms_time_error_ns, 100.0);
+}
+
 }  // namespace
 }  // namespace ftcs::experiment
