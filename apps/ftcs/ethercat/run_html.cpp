@@ -45,6 +45,33 @@ Plot histogram_plot(const MainRunner& run, const char* title, float RunPoint::*f
   return plot;
 }
 
+/// What happened on the way, of all runs: locks, drives that left OP and came back.
+Table events_table(std::span<const MainRunner* const> runs) {
+  Table table({"servo", "s", "drive", "what", "AL status code"});
+  for (const MainRunner* run : runs) {
+    for (const RunEvent& event : run->figures().events) {
+      const bool coded = event.code != ethercat::AlStatusCode::kNoError;
+      table.add_row({run->options().servo_name, Cell::fixed(event.time_s, 3),
+                     event.drive == RunEvent::kNobody ? Cell{"-"} : Cell::count(event.drive),
+                     name(event.kind),
+                     coded ? fmt::format("0x{:04X} {}", static_cast<unsigned>(event.code),
+                                         ethercat::name(event.code))
+                           : "-"});
+    }
+  }
+  return table;
+}
+
+std::string relock_text(std::span<const MainRunner* const> runs) {
+  std::string text;
+  for (const MainRunner* run : runs) {
+    const RunFigures& figures = run->figures();
+    text += fmt::format("{}: lock lost {} times, longest way back {} cycles. ",
+                        run->options().servo_name, figures.lock_losses, figures.longest_relock);
+  }
+  return text;
+}
+
 std::string pair_of(const QuantileSketch& sketch) {
   if (sketch.count() == 0) return "-";
   return format_time(sketch.absolute_quantile(0.5)) + " / " +
@@ -92,6 +119,7 @@ void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> run
   report.add_plot(
       time_plot(runs, "Phase error of the cycle, early is positive", "us", &RunPoint::phase_us));
   if (runs.empty()) return;
+  report.add_table("EtherCAT: what happened", events_table(runs), relock_text(runs));
   const MainRunner& first = *runs.front();
   report.add_plot(histogram_plot(first, "Margin from the frame to SYNC0", &RunPoint::margin_us));
   report.add_plot(histogram_plot(first, "Lateness of the wake-up", &RunPoint::lateness_us));

@@ -25,7 +25,7 @@ struct MainDeviceConfig {
   std::uint32_t lost_frame_limit = 10;
   std::uint32_t working_counter_limit = 10;
   /// Consecutive cycles in which fewer SubDevices answer than were scanned (a wire is cut) before
-  /// the rest is sent to SAFEOP. All stay in reach of a restarted one: it is brought back, below.
+  /// the rest is sent to SAFEOP. A restarted one still answers: it is brought back, see below.
   std::uint32_t absence_limit = 10;
   /// A SubDevice that answers and has lost its configuration is configured again while the others
   /// run; so often in a row at most.
