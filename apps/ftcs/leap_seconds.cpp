@@ -38,16 +38,18 @@ Result<LeapSeconds, std::string> LeapSeconds::parse(std::string_view text, std::
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     const bool expiry = line.starts_with("#@");
-    if (line.starts_with("#") && !expiry) continue;
-    const auto words = words_of(expiry ? line.substr(2) : line);
+    const bool update = line.starts_with("#$");
+    const bool date_alone = expiry || update;
+    if (line.starts_with("#") && !date_alone) continue;
+    const auto words = words_of(date_alone ? line.substr(2) : line);
     if (words.empty()) continue;
     const auto when = parse_integer(words[0], 0, kLatest);
-    if (!when || words.size() < (expiry ? 1U : 2U)) {
+    if (!when || words.size() < (date_alone ? 1U : 2U)) {
       return fmt::format("{}:{}: expected seconds since 1900{}", name, number,
-                         expiry ? "" : " and TAI-UTC");
+                         date_alone ? "" : " and TAI-UTC");
     }
-    if (expiry) {
-      result.expires_ = *when - kFrom1900To1970;
+    if (date_alone) {
+      (expiry ? result.expires_ : result.updated_) = *when - kFrom1900To1970;
       continue;
     }
     const auto offset = parse_integer(words[1], -1000, 1000);

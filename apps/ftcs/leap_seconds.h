@@ -12,7 +12,8 @@
 namespace ftcs::app {
 
 /// The list of leap seconds as IERS and NIST publish it (leap-seconds.list; Debian: package tzdata,
-/// /usr/share/zoneinfo/leap-seconds.list): lines "seconds-since-1900 TAI-UTC", "#@ expiry".
+/// /usr/share/zoneinfo/leap-seconds.list): lines "seconds-since-1900 TAI-UTC", "#@ expiry",
+/// "#$ last update".
 class LeapSeconds {
  public:
   /// An error names the line: "FILE:12: what is wrong".
@@ -29,6 +30,8 @@ class LeapSeconds {
   [[nodiscard]] std::optional<State> at(std::int64_t utc_s) const;
   /// After this nothing is promised; none: the file does not say.
   [[nodiscard]] std::optional<std::int64_t> expires() const { return expires_; }
+  /// When the list was made ("#$"): no moment in which it is read can be earlier.
+  [[nodiscard]] std::optional<std::int64_t> updated() const { return updated_; }
 
  private:
   struct Change {
@@ -37,6 +40,7 @@ class LeapSeconds {
   };
   std::vector<Change> changes_;
   std::optional<std::int64_t> expires_;
+  std::optional<std::int64_t> updated_;
 };
 
 /// Does a UTC month end with this day? Leap seconds happen at no other time (ITU-R TF.460).

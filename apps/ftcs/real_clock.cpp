@@ -13,6 +13,8 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kSecondsPerDay = 86'400;
 /// A leap that has not come so long after its time does not come any more.
 constexpr std::int64_t kPatienceS = 10;
+/// So long after a leap a reference, or who tells us of it, may still speak of the time before.
+constexpr std::int64_t kLaggardS = 90;
 
 }  // namespace
 
@@ -50,24 +52,35 @@ void RealClock::set_reference_scale(const ReferenceScale& scale) {
   const bool first = !std::exchange(scale_known_, true);
   const ReferenceScale old = std::exchange(scale_, scale);
   if (!is_system()) return;
-  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
-  int offset = 0;
-  if (scale.tai) {
-    const auto listed = utc_.leap_seconds ? utc_.leap_seconds->at(utc_s) : std::nullopt;
-    offset = scale.utc_offset.value_or(listed ? listed->utc_offset : utc_.utc_offset);
-    if (!scale.utc_offset && (first || old.utc_offset)) {
-      log_(LogLevel::kNotice, "{}: the reference does not vouch for its UTC offset; using {} s{}",
-           name(), offset, listed ? " of the leap second list" : "");
-    }
+  if (scale.tai && !scale.utc_offset && (first || old.utc_offset)) {
+    log_(LogLevel::kNotice, "{}: the reference does not vouch for its UTC offset; using {} s{}",
+         name(), utc_offset_at(kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond),
+         utc_.leap_seconds ? " of the leap second list" : "");
   }
-  const Duration wanted = Duration::from_whole_ns(offset * kNsPerSecond);
-  const Duration after_leap =
-      clock_.timescale_offset() + Duration::from_whole_ns(armed_leap_ * kNsPerSecond);
-  if (armed_leap_ != 0 && wanted == after_leap) return;  // the leap itself will bring it
-  if (wanted == clock_.timescale_offset()) return;
+  follow_scale();
+}
+
+int RealClock::utc_offset_at(std::int64_t utc_s) const {
+  if (!utc_.leap_seconds) return utc_.utc_offset;
+  // The clock that is asked is the one to be set: it may show anything.
+  const auto listed =
+      utc_.leap_seconds->at(std::max(utc_s, utc_.leap_seconds->updated().value_or(utc_s)));
+  return listed ? listed->utc_offset : utc_.utc_offset;
+}
+
+void RealClock::follow_scale() {
+  if (!scale_known_) return;
+  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
+  const int offset = !scale_.tai ? 0 : scale_.utc_offset.value_or(utc_offset_at(utc_s));
+  const int now = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
+  const bool first = !std::exchange(scale_followed_, true);
+  if (offset == now) return;
+  if (armed_leap_ != 0 && offset == now + armed_leap_) return;  // the leap itself will bring it
+  if (utc_s < no_leap_before_s_ && offset == now - last_leap_) return;  // not yet told of the leap
   log_(first ? LogLevel::kInfo : LogLevel::kWarning, "{}: UTC is {} s behind the reference", name(),
        offset);
-  clock_.set_timescale_offset(wanted);
+  scale_changed_ = !first;
+  clock_.set_timescale_offset(Duration::from_whole_ns(offset * kNsPerSecond));
 }
 
 std::optional<std::string> RealClock::attend(bool steering, bool locked,
@@ -79,6 +92,7 @@ std::optional<std::string> RealClock::attend(bool steering, bool locked,
   report_foreign();
   if (is_system()) {
     follow_leap(steering);
+    follow_scale();
     if (steering) publish(locked, servo);
   }
   return std::nullopt;
@@ -96,7 +110,7 @@ void RealClock::report_foreign() {
          foreign.step->seconds());
   }
   if (foreign.leap != 0) {
-    leap_is_done();
+    leap_is_done(foreign.leap);
     log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
          foreign.leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
   }
@@ -106,15 +120,20 @@ void RealClock::report_foreign() {
 int RealClock::armed_leap(std::int64_t utc_s) const {
   if (!scale_.tai || utc_s < no_leap_before_s_ || !is_last_day_of_month(utc_s)) return 0;
   if (scale_.leap != 0) return scale_.leap;
+  // A reference that is a little ahead has leapt already, and tells only the new offset.
+  const auto now = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
+  if (armed_leap_ != 0 && scale_.utc_offset == now + armed_leap_) return armed_leap_;
   if (!utc_.leap_seconds) return 0;
   const auto listed = utc_.leap_seconds->at(utc_s);
   return listed ? listed->leap : 0;
 }
 
 // An inserted second is the day's last one again, and Announce may go on announcing it for a while.
-void RealClock::leap_is_done() {
+void RealClock::leap_is_done(int leap) {
   armed_leap_ = 0;
-  no_leap_before_s_ = armed_midnight_s_ + kPatienceS;
+  last_leap_ = leap;
+  no_leap_before_s_ = armed_midnight_s_ + kLaggardS;
+  utc_.utc_offset += leap;
 }
 
 void RealClock::follow_leap(bool steering) {
@@ -124,7 +143,7 @@ void RealClock::follow_leap(bool steering) {
                            utc_s >= armed_midnight_s_ - (armed_leap_ < 0 ? 1 : 0);
   if (ours_is_due) {
     const int leap = armed_leap_;
-    leap_is_done();
+    leap_is_done(leap);
     if (const auto error = clock_.leap_now(leap)) {
       log_(LogLevel::kError, "leap second: {}", describe(name(), *error));
     } else {
@@ -152,7 +171,10 @@ void RealClock::publish(bool locked, const ServoSnapshot& servo) {
   platform::TimeStatus status;
   status.synchronised = locked;
   status.leap = utc_.kernel_leap ? armed_leap_ : 0;
-  if (scale_.tai && scale_known_) {
+  // In the second of the leap the kernel changes TAI - UTC itself.
+  const bool leaping =
+      armed_leap_ != 0 && kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond >= armed_midnight_s_ - 1;
+  if (scale_.tai && scale_known_ && !leaping) {
     status.tai_offset = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
   }
   const double sigma_ns = std::isfinite(servo.offset_sigma_ns) ? servo.offset_sigma_ns : 0.0;
@@ -171,6 +193,11 @@ void RealClock::publish(bool locked, const ServoSnapshot& servo) {
   publish_failed_ = result < 0;
 }
 
-void RealClock::stop() { clock_.settle(); }
+void RealClock::stop() {
+  clock_.settle();
+  if (clock_.expiry() && !clock_.failure()) {
+    log_(LogLevel::kError, "{}: the kernel refuses to end a correction; its rate is off", name());
+  }
+}
 
 }  // namespace ftcs::app

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "apps/ftcs/leap_seconds.h"
 #include "apps/ftcs/log.h"
@@ -33,6 +34,10 @@ struct UtcConfig {
 class RealClock {
  public:
   RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc);
+  /// However the program ends, the clock does not stay at the rate of a correction.
+  ~RealClock() { stop(); }
+  RealClock(const RealClock&) = delete;
+  RealClock& operator=(const RealClock&) = delete;
 
   [[nodiscard]] platform::KernelClock& clock() { return clock_; }
   [[nodiscard]] const std::string& name() const { return clock_.device().name(); }
@@ -45,7 +50,11 @@ class RealClock {
   /// When wake_descriptor() can be read.
   void on_wake();
 
+  /// Around a leap second the reference may be a little early or late: what it says is weighed
+  /// against both offsets, and again once the leap is over.
   void set_reference_scale(const ReferenceScale& scale);
+  /// Has the timescale moved under the servo's feet since the last question, other than by a leap?
+  [[nodiscard]] bool take_scale_change() { return std::exchange(scale_changed_, false); }
   /// Once per turn of the loop; returns why the run must end, if it must. `steering`: a command has
   /// been applied, so that the clock is ours to describe.
   [[nodiscard]] std::optional<std::string> attend(bool steering, bool locked,
@@ -55,8 +64,10 @@ class RealClock {
 
  private:
   void report_foreign();
+  void follow_scale();
+  [[nodiscard]] int utc_offset_at(std::int64_t utc_s) const;
   void follow_leap(bool steering);
-  void leap_is_done();
+  void leap_is_done(int leap);
   void publish(bool locked, const ServoSnapshot& servo);
   [[nodiscard]] int armed_leap(std::int64_t utc_s) const;
 
@@ -67,9 +78,12 @@ class RealClock {
   UtcConfig utc_;
   ReferenceScale scale_{};
   bool scale_known_ = false;
+  bool scale_followed_ = false;
+  bool scale_changed_ = false;
   int armed_leap_ = 0;
   std::int64_t armed_midnight_s_ = 0;  ///< UTC: when it is due
   std::int64_t no_leap_before_s_ = 0;  ///< UTC
+  int last_leap_ = 0;                  ///< the one that no_leap_before_s_ belongs to
   std::int64_t attended_raw_s_ = -1;
   bool publish_failed_ = false;
 };

@@ -104,6 +104,38 @@ TEST_F(RealClockTest, a_reference_that_is_ahead_of_the_leap_does_not_undo_it) {
   ASSERT_NE(kernel.system.status & STA_INS, 0);
   real->set_reference_scale({.tai = true, .utc_offset = 38});  // its midnight was a little earlier
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
+  run(20, kNewYear2024);
+  EXPECT_TRUE(leapt) << "it stays armed";
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
+  EXPECT_EQ(kernel.system.tai, 38);
+  EXPECT_FALSE(real->take_scale_change());
+}
+
+TEST_F(RealClockTest, a_reference_that_is_behind_the_leap_does_not_undo_it) {
+  start(kNewYear2024);
+  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  steer();
+  run(20, kNewYear2024);
+  ASSERT_TRUE(leapt);
+  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  run(5, kNewYear2024);
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
+  // One that insists is believed in the end, and the servo is told.
+  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  run(120, kNewYear2024);
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
+  EXPECT_TRUE(real->take_scale_change());
+}
+
+TEST_F(RealClockTest, a_leap_is_kept_where_the_reference_does_not_vouch_for_its_offset) {
+  start(kNewYear2024);
+  real->set_reference_scale({.tai = true, .leap = 1});
+  steer();
+  run(20, kNewYear2024);
+  ASSERT_TRUE(leapt);
+  real->set_reference_scale({.tai = true});
+  run(120, kNewYear2024);
+  EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
 }
 
 TEST_F(RealClockTest, a_leap_flag_on_a_day_without_leap_seconds_is_not_believed) {

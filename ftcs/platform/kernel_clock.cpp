@@ -22,6 +22,8 @@ constexpr std::int64_t kStepFloorPhcNs = 1'000'000;
 constexpr std::int64_t kReadingToleranceNs = 1'000;
 // A timer cannot be set more finely: a correction that has less than this to go ends now.
 constexpr Duration kTimerGrain = Nanoseconds{500};
+// A kernel that refuses is not asked again at once.
+constexpr Duration kRetryInterval{Nanoseconds{10'000'000}};
 // The kernel keeps the frequency in its own units and may return one unit less.
 constexpr double kRateUnit = 2.0e-6 / 65536.0;
 // A leap is one second; readings around it may be this far from it.
@@ -215,10 +217,13 @@ std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noe
   return std::nullopt;
 }
 
-// On an error the correction goes on, and the next command or reading tries again.
+// On an error the correction goes on; the next command, or a reading a little later, tries again.
 void KernelClock::end_correction() noexcept {
-  const auto due = std::exchange(end_, std::nullopt);
-  if (change_rate(tracking_rate_, Duration{})) end_ = due;
+  end_.reset();
+  const auto error = change_rate(tracking_rate_, Duration{});
+  if (!error) return;
+  if (*error == ClockError::kNotPermitted) failure_ = *error;
+  end_ = latest_.free_running + kRetryInterval;
 }
 
 void KernelClock::settle() noexcept {

@@ -205,10 +205,22 @@ TEST_P(KernelClockTest, a_correction_whose_end_was_refused_is_ended_later) {
   kernel.run(20 * kMillisecond);
   (void)clock.read();
   EXPECT_TRUE(clock.expiry().has_value());
+  EXPECT_GT(*clock.wait_for_expiry_ns(), 1'000'000) << "a kernel that refuses is not hammered";
   kernel.adjust_errno = 0;
+  kernel.run(20 * kMillisecond);
   (void)clock.read();
   EXPECT_FALSE(clock.expiry().has_value());
   EXPECT_DOUBLE_EQ(truth().steering(), 1.0);
+}
+
+TEST_P(KernelClockTest, a_correction_that_may_not_be_ended_is_a_failure) {
+  KernelClock clock = make();
+  ASSERT_TRUE(clock.apply(correct(1'000.0, 10 * kMillisecond, 0.0)).ok());
+  kernel.adjust_errno = EPERM;
+  kernel.run(20 * kMillisecond);
+  (void)clock.read();
+  ASSERT_TRUE(clock.failure().has_value());
+  EXPECT_EQ(*clock.failure(), ClockError::kNotPermitted);
 }
 
 TEST_P(KernelClockTest, refuses_rates_beyond_the_device_and_everything_if_it_may_not_steer) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/stop_flag.h"
 
+#include <cstddef>
+
 namespace ftcs::platform {
 namespace {
 
@@ -14,15 +16,15 @@ void request_stop(int) { stop_requested = 1; }
 StopFlag::StopFlag() {
   stop_requested = 0;
   struct sigaction action {};
-  action.sa_handler = request_stop;
   sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, &previous_interrupt_);
-  sigaction(SIGTERM, &action, &previous_terminate_);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    action.sa_handler = kSignals[i] == SIGPIPE ? SIG_IGN : request_stop;
+    sigaction(kSignals[i], &action, &previous_[i]);
+  }
 }
 
 StopFlag::~StopFlag() {
-  sigaction(SIGINT, &previous_interrupt_, nullptr);
-  sigaction(SIGTERM, &previous_terminate_, nullptr);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &previous_[i], nullptr);
 }
 
 bool StopFlag::is_set() const noexcept { return stop_requested != 0; }

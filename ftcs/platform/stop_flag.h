@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <csignal>
 
 namespace ftcs::platform {
 
-/// Turns SIGINT and SIGTERM into a flag for as long as it lives; one at a time. A signal also ends
-/// a poll(2).
+/// Turns SIGINT, SIGTERM, SIGHUP and SIGQUIT into a flag for as long as it lives; one at a time. A
+/// signal also ends a poll(2). SIGPIPE is ignored meanwhile: a reader of our output that goes away
+/// must not end the program before it has left its clock at a good rate.
 class StopFlag {
  public:
   StopFlag();
@@ -17,8 +19,9 @@ class StopFlag {
   [[nodiscard]] bool is_set() const noexcept;
 
  private:
-  struct sigaction previous_interrupt_ {};
-  struct sigaction previous_terminate_ {};
+  static constexpr std::array<int, 5> kSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE};
+
+  std::array<struct sigaction, kSignals.size()> previous_{};
 };
 
 }  // namespace ftcs::platform
