@@ -248,8 +248,10 @@ template <std::size_t Capacity>
 bool SecondOpinion<Capacity>::contradicted(double forward, double backward) const noexcept {
   const Sizes ahead = innovations(1.0);
   const Sizes back = innovations(-1.0);
-  return (ahead.typical > forward && back.typical > backward) ||
-         ahead.least > kOneSided * forward || back.least > kOneSided * backward;
+  // Coarse stamps of one direction can agree to the digit: it must not set the measure for itself.
+  const double one_sided = kOneSided * std::max(forward, backward);
+  return (ahead.typical > forward && back.typical > backward) || ahead.least > one_sided ||
+         back.least > one_sided;
 }
 
 template <std::size_t Capacity>
