@@ -100,6 +100,18 @@ cmp whole.json merged.json || fail "the merge of three shards differs from the w
 "$ftcs" simulate good.toml -q --threads 1 --json again.json
 cmp whole.json again.json || fail "one thread gives another result than several"
 
+# Memory does not depend on the length of a run: a hundred times as many cycles, the same peak to 2 MiB.
+peak_kib() {
+  python3 -c 'import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)' "$ftcs" simulate "$1" -q --threads 1 --seeds 1
+}
+sed 's/cycles = 40/cycles = 1000/' good.toml > short.toml
+sed 's/cycles = 40/cycles = 100000/' good.toml > long-run.toml
+short=$(peak_kib short.toml)
+long=$(peak_kib long-run.toml)
+[ $((long - short)) -lt 2048 ] || fail "memory grows with the run: $short KiB for 1,000 cycles, $long KiB for 100,000"
+
 # An interrupted sweep writes what it has.
 sed 's/seeds = 5/seeds = 100000/' good.toml > long.toml
 "$ftcs" simulate long.toml -q --json interrupted.json 2> err &
