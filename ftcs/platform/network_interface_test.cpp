@@ -40,13 +40,13 @@ TEST(NetworkInterface, reports_why_hardware_stamps_cannot_be_enabled) {
   FakeKernel kernel;
   InterfaceCapabilities capabilities;
   capabilities.receive_filters = 1U << HWTSTAMP_FILTER_PTP_V2_L4_EVENT;
-  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities));
+  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false));
   kernel.hardware_config_errno = EPERM;
-  const auto denied = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities);
+  const auto denied = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false);
   ASSERT_TRUE(denied);
   EXPECT_EQ(denied->kind, OsErrorKind::kNotPermitted);
   capabilities.receive_filters = 0;
-  const auto none = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities);
+  const auto none = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false);
   ASSERT_TRUE(none);
   EXPECT_EQ(none->kind, OsErrorKind::kTimestampingUnsupported);
 }
