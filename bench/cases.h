@@ -92,6 +92,24 @@ struct TwoWayCase {
   }
 };
 
+/// One message, of alternating direction, into a whole servo.
+template <class Servo>
+struct MessageCase {
+  World world{};
+  Servo servo{typename Servo::Config{}};
+  bool forward = false;
+  ServoUpdate step() noexcept {
+    forward = !forward;
+    if (forward) {
+      world.next();
+      return servo.update({Direction::kForward, world.origin(), world.local(), world.received()},
+                          world.now());
+    }
+    const EventPair pair = world.backward();
+    return servo.update({pair.direction, pair.reference, {}, pair.free_running}, world.now());
+  }
+};
+
 struct BenchSource final : FreeRunningSource {
   World world{};
   [[nodiscard]] FreeRunningTime now() noexcept override { return world.now().free_running; }
@@ -170,6 +188,12 @@ void for_each_case(const Visit& visit) {
   visit("ftcs_update", std::type_identity<LawCase<FtcsServo>>{});
   visit("pics_update", std::type_identity<LawCase<PicsServo>>{});
   visit("linuxptp_pi_update", std::type_identity<LawCase<LinuxptpPiServo>>{});
+  visit("adaptive_message", std::type_identity<MessageCase<AdaptiveServo>>{});
+  visit("small_adaptive_message", std::type_identity<MessageCase<SmallAdaptiveServo>>{});
+  visit("kalman_message", std::type_identity<MessageCase<KalmanServo>>{});
+  visit("regression_update", std::type_identity<LawCase<RegressionServo>>{});
+  visit("pid_update", std::type_identity<LawCase<PidServo>>{});
+  visit("frequency_compensated_update", std::type_identity<LawCase<FrequencyCompensatedServo>>{});
   visit("two_way_servo_cycle", std::type_identity<TwoWayCase>{});
   visit("discipline_cycle", std::type_identity<DisciplineCase>{});
   visit("virtual_clock_apply", std::type_identity<ClockApplyCase>{});

@@ -31,7 +31,26 @@ StepPolicy step_policy(const PtpOptions& options) {
   return {StepMode::kFirst, options.first_step_threshold};
 }
 
-DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps) {
+/// Empty, with a notice, where the servo has nothing to keep.
+std::string driftfile(const PtpOptions& options, Log& log) {
+  if (options.driftfile.empty() || options.servo.kind == ServoKind::kAdaptive)
+    return options.driftfile;
+  log(LogLevel::kNotice, "driftfile {}: not used, the servo {} keeps no state", options.driftfile,
+      servo_kind_name(options.servo.kind));
+  return {};
+}
+
+/// What makes a learnt rate another clock's.
+std::string clock_name(const PtpOptions& options, bool hardware_stamps) {
+  const char* steered = options.clock == ClockKind::kVirtual  ? "virtual"
+                        : options.clock == ClockKind::kSystem ? "system"
+                                                              : "phc";
+  return fmt::format("{}, {} clock, {} timestamps, skew {} ppb", options.interface, steered,
+                     hardware_stamps ? "hardware" : "software", options.skew_ppb);
+}
+
+DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps,
+                                   const std::optional<LearntState>& learnt) {
   DisciplineConfig config;
   config.servo = options.servo;
   // Peer to peer: the delay is added to the reference before the servo sees a pair.
@@ -41,6 +60,7 @@ DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stam
   config.servo.linuxptp_pi.timestamping =
       hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
   config.servo.adaptive.steering.first_step_allowed = options.first_step;
+  config.servo.adaptive.learnt = learnt;
   config.step = step_policy(options);
   config.largest_first_offset = kLargestFirstOffset;
   return config;
@@ -55,8 +75,17 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
       clock_(clock),
       start_(start),
       label_(std::move(label)),
-      discipline_(discipline_config(options, hardware_stamps), clock),
-      link_delay_(options.servo.two_way.path_delay) {}
+      state_(log, driftfile(options, log), options.driftfile_interval,
+             clock_name(options, hardware_stamps)),
+      discipline_(discipline_config(options, hardware_stamps, state_.learnt()), clock),
+      link_delay_(options.servo.two_way.path_delay) {
+  if (!state_.learnt()) return;
+  // At the known rate from now on, long before the first message: what a driftfile is for.
+  ServoCommand command;
+  command.tracking_rate = Rate::from_ratio(1.0 / (1.0 + state_.learnt()->rate_deviation));
+  if (!clock.apply(command))
+    log(LogLevel::kWarning, "{}: the clock refuses the driftfile's rate", label_);
+}
 
 std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, FreeRunningTime now,
                                                   std::optional<Duration> sync_interval) {
@@ -104,6 +133,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
     failure = report(record, sync_interval);
   }
   follow_lock(now);
+  if (used && locked()) state_.note(telemetry.servo, now);
   return failure;
 }
 
@@ -197,6 +227,7 @@ std::uint64_t ClockFollower::samples_per_summary(std::optional<Duration> sync_in
 }
 
 void ClockFollower::log_summary() {
+  state_.save();
   const DisciplineCounters& counters = discipline_.counters();
   log_(LogLevel::kNotice, "summary: {}, {} samples used, {} rejected, {} steps",
        locked() ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);

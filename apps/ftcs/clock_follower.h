@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/ftcs/kept_state.h"
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
 #include "apps/ftcs/sample_report.h"
@@ -34,7 +35,7 @@ class ClockFollower {
   void on_silence();
   /// Another reference: what was learnt about the old one is void.
   void on_new_reference() { discipline_.on_new_reference(); }
-  /// The summary's lines.
+  /// At the end: the summary's lines; what was learnt goes to the driftfile.
   void log_summary();
 
   [[nodiscard]] bool locked() const { return discipline_.locked(); }
@@ -75,6 +76,7 @@ class ClockFollower {
   AdjustableClock& clock_;
   FreeRunningTime start_;
   std::string label_;
+  StateKeeper state_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
   std::optional<EventPair> waiting_{};  ///< for the first link delay

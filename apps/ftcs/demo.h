@@ -23,7 +23,10 @@ struct DemoOptions {
   Duration offset{Nanoseconds{1'000'000}};
   double max_frequency_ppb = 100'000'000.0;  ///< ±100,000 ppm
   std::uint16_t event_port =
-      0;                  ///< 0: chosen from the process number, and the next one for general
+      0;  ///< 0: chosen from the process number, and the next one for general
+  /// Listen there, on PTP's own ports, to a time transmitter that stamps with this machine's
+  /// CLOCK_REALTIME, instead of starting one on loopback. Empty: an own one.
+  std::string interface {};
   bool live_view = true;  ///< on a terminal only
   bool ptp = true;
   bool ethercat = true;
@@ -51,7 +54,7 @@ class DemoReceiver final : public PtpCorePort<ptp::TimeReceiver> {
  public:
   DemoReceiver(platform::Kernel& kernel, const PtpOptions& options, const DemoOptions& demo,
                Log& log, std::unique_ptr<platform::TimestampClock> timestamps,
-               platform::ChildProcess& transmitter);
+               platform::ChildProcess* transmitter);  ///< null: somebody else's
 
   /// Meaningful after run().
   [[nodiscard]] DemoResult result() const;
@@ -65,7 +68,7 @@ class DemoReceiver final : public PtpCorePort<ptp::TimeReceiver> {
   void draw();
 
   DemoOptions demo_;
-  platform::ChildProcess& transmitter_;
+  platform::ChildProcess* transmitter_;
   TrueReference truth_;
   std::vector<std::unique_ptr<ServoTrial>> trials_;
   std::vector<double> one_way_ns_;  // t2 - t1 of every Sync, both on the common oscillator

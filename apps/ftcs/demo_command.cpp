@@ -52,9 +52,14 @@ ptp::ClockIdentity identity(std::uint8_t last) {
 PtpOptions port_options(platform::Kernel& kernel, const DemoOptions& demo) {
   PtpOptions options;
   options.interface = "lo";
-  options.socket.interface = "lo";
-  options.socket.event_port = demo.event_port != 0 ? demo.event_port : default_event_port(kernel);
-  options.socket.general_port = static_cast<std::uint16_t>(options.socket.event_port + 1);
+  if (!demo.interface.empty()) {
+    options.interface = demo.interface;
+    options.timestamps = platform::TimestampMode::kSoftware;  // the truth is CLOCK_REALTIME
+  } else {
+    options.socket.event_port = demo.event_port != 0 ? demo.event_port : default_event_port(kernel);
+    options.socket.general_port = static_cast<std::uint16_t>(options.socket.event_port + 1);
+  }
+  options.socket.interface = options.interface;
   options.log_sync_interval = demo.log_sync_interval;
   options.log_min_delay_req_interval = demo.log_sync_interval;
   options.log_announce_interval = -2;  // two of them qualify the transmitter: half a second
@@ -132,16 +137,21 @@ int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
     return kRuntimeError;
   }
   options.start = clock->read_realtime();  // both processes stand on this line: the truth is known
-  auto transmitter = platform::ChildProcess::start([&options] { return run_transmitter(options); });
-  if (!transmitter) {
-    fmt::print(stderr, "ftcs demo: {}\n", transmitter.error().message());
-    return kRuntimeError;
+  std::optional<platform::ChildProcess> transmitter;
+  if (demo.interface.empty()) {
+    auto started = platform::ChildProcess::start([&options] { return run_transmitter(options); });
+    if (!started) {
+      fmt::print(stderr, "ftcs demo: {}\n", started.error().message());
+      return kRuntimeError;
+    }
+    transmitter.emplace(std::move(*started));
   }
   options.clock_identity = identity(2);
   options.skew_ppb = demo.skew_ppb;
   options.duration = Duration::from_ns(demo.duration_s * 1e9);
   const std::string timestamps = clock->is_hardware() ? "hardware" : "kernel software";
-  DemoReceiver receiver(kernel, options, demo, log, std::move(clock), *transmitter);
+  DemoReceiver receiver(kernel, options, demo, log, std::move(clock),
+                        transmitter ? &*transmitter : nullptr);
   if (const int code = receiver.run(); code != kSuccess) return code;
   result = receiver.result();
   result.timestamps = timestamps;
@@ -203,6 +213,11 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command->add_option("--html", arguments->files.html, "write a report with plots to this file")
       ->type_name("FILE");
+  command
+      ->add_option("--interface", options.interface,
+                   "no transmitter of its own: listen there to one that stamps with this machine's "
+                   "CLOCK_REALTIME")
+      ->type_name("NAME");
   command->add_option("--part", arguments->part, "both (default), ptp or ethercat")
       ->check(CLI::IsMember({"both", "ptp", "ethercat"}));
   command->add_option("--offset", arguments->offset, "of the clock at the start; default 1ms")

@@ -2,6 +2,7 @@
 #include "apps/ftcs/ptp_option_table.h"
 
 #include <array>
+#include <filesystem>
 #include <limits>
 
 #include <fmt/core.h>
@@ -99,6 +100,17 @@ Wrong set_capable(PtpOptions& options, std::string_view text) {
 Wrong set_clock_servo(PtpOptions& options, std::string_view text) {
   if (auto wrong = only(text, "pi")) return *wrong + " (--servo knows more)";
   options.servo.kind = ServoKind::kLinuxptpPi;
+  return std::nullopt;
+}
+
+Wrong set_driftfile(PtpOptions& options, std::string_view text) {
+  const std::filesystem::path path(text);
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  std::error_code ignored;
+  if (!path.has_filename() || !std::filesystem::is_directory(folder, ignored)) {
+    return fmt::format("'{}': expected a file in a folder that exists", text);
+  }
+  options.driftfile = text;
   return std::nullopt;
 }
 
@@ -240,6 +252,10 @@ constexpr std::array kSettings{
     PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
     PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
     PtpSetting{"max_frequency", "ppb", set_max_frequency},
+    PtpSetting{"driftfile", "file that keeps the learnt rate and noise over restarts",
+               set_driftfile},
+    PtpSetting{"driftfile_interval", "s between two writes; default 3600",
+               FTCS_SET(seconds(v, o.driftfile_interval))},
     PtpSetting{"delay_filter", "moving_median or moving_minimum", set_delay_filter},
     PtpSetting{
         "delay_filter_length", "samples, 1 to 32",

@@ -89,6 +89,8 @@ struct PtpOptions {
   bool kernel_leap = true;     ///< ptp4l's kernel_leap: leap seconds are the kernel's to make
   bool free_running = false;   ///< ptp4l's free_running: measure, steer nothing
   bool first_step = false;     ///< step once, whatever the servo
+  std::string driftfile{};     ///< where what the servo learns is kept; empty: nowhere
+  Nanoseconds driftfile_interval{3'600'000'000'000};
   Nanoseconds first_step_threshold{20'000};
   Nanoseconds step_threshold{0};
 

@@ -19,6 +19,7 @@ enum class ServoConfigError : std::uint8_t {
   kStepThreshold,
   kNoise,
   kActuator,
+  kLearntState,
 };
 
 /// One sentence: what was expected.
@@ -46,6 +47,8 @@ enum class ServoConfigError : std::uint8_t {
       return "a step threshold must not be negative";
     case ServoConfigError::kActuator:
       return "latency, granularity and largest rate change must be finite and not negative";
+    case ServoConfigError::kLearntState:
+      return "a learnt state needs a rate within 50 % of nominal, deviation and noise above zero";
   }
   return "unknown configuration error";
 }

@@ -42,6 +42,7 @@ std::optional<ServoConfigError> validate(const AdaptiveConfig& config) noexcept 
                         steering.rate_granularity >= 0.0 && steering.time_granularity >= none &&
                         steering.latency >= none && config.path_delay_sigma >= none;
   if (!possible) return ServoConfigError::kActuator;
+  if (config.learnt && !config.learnt->valid()) return ServoConfigError::kLearntState;
   return std::nullopt;
 }
 
@@ -51,6 +52,11 @@ BasicAdaptiveServo<Grid>::BasicAdaptiveServo(const AdaptiveConfig& config) noexc
       estimator_(known_delay(config)),
       steering_(config.steering) {
   reset();
+  if (config.learnt) {
+    const double cycle = meter_.interval_ns();
+    estimator_.expect({config.learnt->rate_deviation * cycle, config.learnt->rate_sigma * cycle},
+                      config.learnt->timestamp_noise_ns);
+  }
 }
 
 template <class Grid>

@@ -8,6 +8,7 @@
 #include "ftcs/servo/adaptive/interval_meter.h"
 #include "ftcs/servo/adaptive/message_order.h"
 #include "ftcs/servo/adaptive/steering.h"
+#include "ftcs/servo/learnt_state.h"
 #include "ftcs/servo/servo.h"
 #include "ftcs/servo/servo_config_error.h"
 
@@ -22,6 +23,8 @@ struct AdaptiveConfig {
   /// direction suffices from the second message on.
   std::optional<Nanoseconds> fixed_path_delay{};
   Nanoseconds path_delay_sigma{0};
+  /// What an earlier run has learnt: the rate and the noise to start from. Void after a reset.
+  std::optional<LearntState> learnt{};
 };
 
 [[nodiscard]] std::optional<ServoConfigError> validate(const AdaptiveConfig& config) noexcept;

@@ -82,11 +82,20 @@ void Estimator<Grid>::restart() noexcept {
       Estimator(delay);  // in place: too large for the stack of a real-time thread
 }
 
+/// Kept in the mixed estimate, which nobody else needs before the first message.
+template <class Grid>
+void Estimator<Grid>::expect(const RatePrior& rate, double noise_ns) noexcept {
+  scale_ = robust_scale_ = noise_ns;
+  mixed_.y = rate.mean;
+  mixed_.yy = rate.sigma * rate.sigma / (noise_ns * noise_ns);
+}
+
 template <class Grid>
 void Estimator<Grid>::begin(Direction direction) noexcept {
   Estimate start;
   start.xx = kOffsetPrior;
-  start.yy = kRatePrior;
+  start.y = mixed_.y;
+  start.yy = mixed_.yy > 0.0 ? mixed_.yy : kRatePrior;
   if (known_delay_.known()) {
     start.d = known_delay_.mean_ns;
     start.dd = known_delay_.sigma_ns * known_delay_.sigma_ns / (scale_ * scale_);

@@ -22,6 +22,12 @@ struct KnownDelay {
   [[nodiscard]] bool known() const noexcept { return sigma_ns >= 0.0; }
 };
 
+/// What is known of the rate before the first message, ns per cycle.
+struct RatePrior {
+  double mean = 0.0;
+  double sigma = 0.0;
+};
+
 /// Joint estimate of offset, rate and path delay of the free-running clock against the reference:
 /// the bank, its evidence, what is learnt about noise, and the detection of changes.
 template <class Grid>
@@ -30,6 +36,10 @@ class Estimator {
   explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
   /// Forgets everything but the known delay, in place: a temporary would be kilobytes of stack.
   void restart() noexcept;
+
+  /// Before the first message: a rate and a timestamp noise (ns) to start from. The noise is a
+  /// start as any other; the rate counts as much as its sigma says.
+  void expect(const RatePrior& rate, double noise_ns) noexcept;
 
   /// Returns the probability that the message is no outlier.
   double update(Direction direction, const Observation& seen) noexcept;

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#include "apps/ftcs/kept_state.h"
+
+#include <gtest/gtest.h>
+
+namespace ftcs::app {
+namespace {
+
+constexpr std::int64_t kSavedAt = 1'700'000'000;
+constexpr std::int64_t kDay = 86'400;
+const KeptState kState{"eth0, software timestamps, skew 0 ppb", kSavedAt, {12.5e-6, 3e-7, 80.0}};
+
+std::string objection(std::string_view text, std::int64_t now = kSavedAt + 10,
+                      std::string_view clock = kState.clock) {
+  const auto state = read_kept_state(text, clock, now);
+  return state ? "" : state.error();
+}
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(KeptState, comes_back_as_it_was) {
+  const auto state = read_kept_state(to_text(kState), kState.clock, kSavedAt + kDay);
+  ASSERT_TRUE(state.ok());
+  EXPECT_DOUBLE_EQ(state->rate_deviation, 12.5e-6);
+  EXPECT_DOUBLE_EQ(state->rate_sigma, 3e-7);
+  EXPECT_DOUBLE_EQ(state->timestamp_noise_ns, 80.0);
+}
+
+// A servo that ran for a day knows its rate to 1e-12; the crystal does not come back to that.
+TEST(KeptState, no_crystal_is_believed_better_than_a_fifth_of_a_ppm) {
+  KeptState state = kState;
+  state.learnt.rate_sigma = 1e-12;
+  EXPECT_DOUBLE_EQ(read_kept_state(to_text(state), state.clock, kSavedAt)->rate_sigma, 2e-7);
+}
+
+TEST(KeptState, broken_files_are_refused) {
+  const std::string text = to_text(kState);
+  for (std::size_t length = 0; length + 2 < text.size(); ++length)
+    EXPECT_EQ(objection(text.substr(0, length)), "it is broken") << length;
+  EXPECT_EQ(objection("[1, 2]"), "it is broken");
+  EXPECT_EQ(objection(with(text, "12500.0", "\"fast\"")), "it is broken");
+  EXPECT_EQ(objection(std::string(1000, '\0')), "it is broken");
+}
+
+TEST(KeptState, other_clocks_versions_and_ages_are_refused_with_the_reason) {
+  const std::string text = to_text(kState);
+  EXPECT_EQ(objection(with(text, "\"ftcs_state\": 1", "\"ftcs_state\": 2")),
+            "it has format 2, this program knows 1");
+  EXPECT_EQ(objection(text, kSavedAt, "eth1, hardware timestamps, skew 0 ppb"),
+            "it is of another clock (eth0, software timestamps, skew 0 ppb), this is eth1, "
+            "hardware timestamps, skew 0 ppb");
+  EXPECT_EQ(objection(text, kSavedAt + 91 * kDay), "it is 91 days old");
+  EXPECT_EQ(objection(with(text, "12500.0", "-6e8")), "its figures are impossible");
+  EXPECT_EQ(objection(with(text, "80.0", "0.0")), "its figures are impossible");
+}
+
+// The machine's own clock may have been wrong when it was written.
+TEST(KeptState, a_state_from_the_future_is_used) {
+  EXPECT_EQ(objection(to_text(kState), kSavedAt - 1000 * kDay), "");
+}
+
+}  // namespace
+}  // namespace ftcs::app

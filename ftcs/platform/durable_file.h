@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace ftcs::platform {
+
+/// Replaces the file `path` by `content` so that at any moment, a crash or loss of power included,
+/// either the old or the new content is there: written to a temporary file beside it, synchronised,
+/// renamed, the folder synchronised. Returns what failed, with the system's reason.
+[[nodiscard]] std::optional<std::string> write_durably(const std::string& path,
+                                                       std::string_view content);
+
+}  // namespace ftcs::platform

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/durable_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+namespace ftcs::platform {
+namespace {
+
+class DurableFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("ftcs-durable-" + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  [[nodiscard]] std::string content(const std::string& name) const {
+    std::ifstream file(folder_ / name);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  [[nodiscard]] std::ptrdiff_t files() const {
+    return std::distance(std::filesystem::directory_iterator(folder_), {});
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(DurableFile, replaces_the_old_content_and_leaves_nothing_beside_it) {
+  EXPECT_EQ(write_durably(folder_ / "a", "one"), std::nullopt);
+  EXPECT_EQ(write_durably(folder_ / "a", "another one"), std::nullopt);
+  EXPECT_EQ(content("a"), "another one");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(DurableFile, a_failure_names_the_file_and_costs_nothing) {
+  const auto missing = write_durably(folder_ / "none" / "a", "x");
+  ASSERT_TRUE(missing.has_value());
+  EXPECT_NE(missing->find("none/a: No such file or directory"), std::string::npos) << *missing;
+  std::filesystem::create_directories(folder_ / "taken" / "inside");
+  EXPECT_TRUE(write_durably(folder_ / "taken", "x").has_value());  // a folder is in the way
+  EXPECT_EQ(files(), 1);
+}
+
+}  // namespace
+}  // namespace ftcs::platform
