@@ -81,17 +81,16 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       sink_(std::move(clocks.sink)),
       comparison_(std::move(clocks.comparison)),
       discipline_(discipline_config(options, comparison_.is_exact()), sink_->clock()) {
-  if (options.automatic || options.wait_for_port) {
-    if (!options.sink_ahead_s) return;  // the port will tell
-  }
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
-  ReferenceScale scale;
-  scale.tai = !options.sink_ahead_s && sink_->is_system();
-  sink_->set_reference_scale(scale);
   if (options.sink_ahead_s) {
     sink_->clock().set_timescale_offset(
         Duration::from_whole_ns(-*options.sink_ahead_s * kNsPerSecond));
+    return;
   }
+  if (options.automatic || options.wait_for_port) return;  // the port will tell
+  ReferenceScale scale;
+  scale.tai = sink_->is_system();
+  sink_->set_reference_scale(scale);
 }
 
 void PhcRunner::follow_port(PortWatch watch, bool receiving) {
@@ -150,6 +149,7 @@ int PhcRunner::run() {
     const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
                                      discipline_.latest().servo);
     if (wrong) fail(*wrong);
+    if (sink_->take_scale_change()) discipline_.on_new_reference();
   }
   sink_->stop();
   if (failure_) {
