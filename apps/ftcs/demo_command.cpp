@@ -87,7 +87,7 @@ int run_transmitter(PtpOptions options) {
     fmt::print(stderr, "ftcs demo: {}\n", error->message());
     return kRuntimeError;
   }
-  return PtpTransmitter(kernel, options, log, std::move(clock), {identity(1), 1}).run();
+  return PtpTransmitter(kernel, options, log, std::move(clock), {{identity(1), 1}}).run();
 }
 
 struct DemoArguments {
