@@ -37,7 +37,7 @@ double drift_ns(const TimestampClock::RealtimeReading& a,
 
 class Trials {
  public:
-  Trials(SkewedSource& source, const TimestampClock::RealtimeReading& start) : source_(source) {
+  Trials(SkewedSource& source, const TimestampClock::RealtimeReading& start) {
     VirtualClockConfig clock;
     clock.free_running = start.free_running;
     clock.local = LocalTime::from_ns(start.realtime_ns) + kOffset;
@@ -81,7 +81,6 @@ class Trials {
     return std::sqrt(sum / static_cast<double>(offsets.size() - first));
   }
 
-  SkewedSource& source_;
   std::vector<std::unique_ptr<app::ServoTrial>> trials_;
 };
 

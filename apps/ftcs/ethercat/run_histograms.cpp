@@ -15,7 +15,9 @@ constexpr double kShownQuantile = 0.999;
 Histogram run_histogram(const RunFigures& figures, float RunPoint::*field) {
   std::vector<double> values;
   values.reserve(figures.trace.size());
-  for (const RunPoint& point : figures.trace) values.push_back(point.*field);
+  for (const RunPoint& point : figures.trace) {
+    values.push_back(static_cast<double>(point.*field));
+  }
   std::sort(values.begin(), values.end());
   const double lower = quantile_of_sorted(values, 1.0 - kShownQuantile);
   const double upper = quantile_of_sorted(values, kShownQuantile);

@@ -16,8 +16,8 @@ PlotSeries over_time(const MainRunner& run, float RunPoint::*field) {
   PlotSeries series;
   series.name = run.options().servo_name;
   for (const RunPoint& point : run.figures().trace) {
-    series.x.push_back(point.time_s);
-    series.y.push_back(point.*field);
+    series.x.push_back(static_cast<double>(point.time_s));
+    series.y.push_back(static_cast<double>(point.*field));
   }
   return series;
 }
