@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
+#include "ftcs/servo/adaptive/lanes.h"
 #include "ftcs/servo/adaptive/noise_model.h"
 
 namespace ftcs::adaptive {
@@ -20,36 +22,40 @@ class ChangeDetector {
   static constexpr std::size_t kCalm = kSize - Grid::kJumps;
   static constexpr std::size_t kNone = kSize;
 
-  void add(const std::array<double, kSize>& log_density) noexcept {
+  /// Bit i: calm model i may have been overtaken. Only then is take_over(i) worth asking.
+  std::uint32_t add(const std::array<double, kSize>& log_density) noexcept {
     std::array<float, kWidth> l{};
     for (std::size_t j = 0; j < kWidth; ++j) {
       l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
     }
+    std::uint32_t overtaken = 0;
     for (std::size_t i = 0; i < kCalm; ++i) {
       const float own = l[i];
-      std::array<float, kLanes> peak{};  // lanes, so that the compiler may use vectors
-      for (std::size_t j = (i + 1) / kLanes * kLanes; j < kWidth; j += kLanes) {
-        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-          const float sum = std::max(0.0F, sums_[i][j + lane] + (l[j + lane] - own));
-          sums_[i][j + lane] = sum;
-          peak[lane] = std::max(peak[lane], sum);
-        }
+      std::size_t j = (i + 1) / kFour * kFour;
+      Quad behind = load<Quad>(&kBehind[kFour - 1 - i % kFour]);  // nothing of calmer models
+      if (j > i) behind = Quad{};
+      auto alarm = Quad{} > Quad{};
+      for (; j < kWidth; j += kFour, behind = Quad{}) {
+        const Quad sum =
+            larger<Quad>(Quad{}, load<Quad>(&sums_[i][j]) + (load<Quad>(&l[j]) + behind - own));
+        store(&sums_[i][j], sum);
+        alarm |= sum > load<Quad>(&kNeeded[j]);
       }
-      peaks_[i] = std::max(std::max(peak[0], peak[1]), std::max(peak[2], peak[3]));
+      overtaken |= static_cast<std::uint32_t>(any(alarm)) << i;
     }
+    return overtaken;
   }
 
   /// The model that overtakes calm model i after `count` messages, or kNone. Clears its sums.
   [[nodiscard]] std::size_t take_over(std::size_t i, double count) noexcept {
-    if (peaks_[i] <= static_cast<float>(kThreshold)) return kNone;
     // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
     const auto calm_threshold = static_cast<float>(kThreshold * (1.0 + 16.0 / count));
     std::size_t winner = kNone;
-    float largest = 0.0F;
+    float furthest = 0.0F;
     for (std::size_t j = i + 1; j < kSize; ++j) {
       const float lead = j < kCalm - 1 ? sums_[i][j] : sums_[i][j] - kHandicap;
-      if (lead > largest) {
-        largest = lead;
+      if (lead > furthest) {
+        furthest = lead;
         winner = j;
       }
     }
@@ -70,12 +76,23 @@ class ChangeDetector {
   /// Jumps and the wildest frequency model explain anything: Occam's factor against them, nats.
   static constexpr float kHandicap = 4.0F;
 
-  static constexpr std::size_t kLanes = 4;
-  static constexpr std::size_t kWidth = (kSize + kLanes - 1) / kLanes * kLanes;
+  static constexpr std::size_t kFour = 4;
+  static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
   static constexpr float kNever = -1e30F;
+  /// Read from place 3 - i % 4 on it spares the models behind i in i's own group of four.
+  static constexpr std::array<float, 2 * kFour> kBehind = {kNever, kNever, kNever, kNever,
+                                                           0.0F,   0.0F,   0.0F,   0.0F};
+
+  static constexpr std::array<float, kWidth> kNeeded = [] {
+    std::array<float, kWidth> needed{};
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      needed[j] = j < kCalm ? static_cast<float>(kThreshold) : kJumpThreshold;
+    }
+    return needed;
+  }();
+  static_assert(kCalm <= 32);
 
   std::array<std::array<float, kWidth>, kCalm> sums_{};
-  std::array<float, kCalm> peaks_{};  ///< largest of each row (up to three calmer models included)
 };
 
 }  // namespace ftcs::adaptive

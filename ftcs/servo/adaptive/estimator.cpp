@@ -3,6 +3,7 @@
 #include "ftcs/servo/adaptive/estimator.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <new>
 
@@ -24,24 +25,11 @@ constexpr std::uint32_t kEvidenceFrom = 3;
 constexpr std::uint32_t kMixFrom = 4;
 constexpr std::uint32_t kJudgeFrom = 6;
 constexpr std::uint32_t kLearnFrom = 16;
-/// One innovation, normalised and squared, counts at most this much as evidence.
-constexpr double kEvidenceLimit = 12.0;
-constexpr double kEvidenceMemory = 4000.0;
 constexpr std::uint32_t kYoung = 100;
 constexpr std::uint8_t kRejectedInARow = 8;
 constexpr std::uint8_t kRejectedAtLeast = 3;
 constexpr double kRejected = 0.1;
 constexpr double kSmallestScale = 1e-4;
-constexpr double kSmallestSquare = 1e-30;
-/// Nats; a weight of e^-40 moves nothing.
-constexpr double kHopeless = 40.0;
-/// Twice nats per place behind the starting model: with three messages every model is as likely as
-/// the next, and the wildest would take the noise for motion. Forgotten after a dozen messages.
-constexpr double kWildnessCost = 1.0;
-/// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
-/// then the calmer of two models that explain the same is the better bet. More than this costs
-/// oscillators that do wander slowly.
-constexpr double kCalmGain = 0.06;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
@@ -169,7 +157,11 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   const double innovation = innovations.centred[best_] + scale_ * shape_[side].tail;
   const double predicted = innovations.predicted[best_];
   gain_ = credit * predicted / (predicted + shape_[side].total_variance());
-  if (count_ > kEvidenceFrom && observable()) gather_evidence(innovations);
+  if (count_ > kEvidenceFrom && observable()) {
+    // The credit of the best model, for all: a model that rejected every message as an outlier
+    // would otherwise gather no squares and look perfect.
+    evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
+  }
   if (count_ > kJudgeFrom) {
     double& late = late_outliers_[side];
     late =
@@ -178,9 +170,8 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   }
   follow_gate(side, credit, innovation);
   if (count_ == 0) return 0.0;
-  if (weight_sum_ > 0.0 || count_ > kEvidenceFrom) {
-    const double variance = innovations.variance[best_] / (scale_ * scale_);
-    residuals_.push(std::abs(innovations.centred[best_]) / std::sqrt(variance));
+  if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
+    residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
     follow_scale();
   }
   if (count_ > kLearnFrom) {
@@ -232,7 +223,7 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   rejected_ = {};
   taken_ = {};
   residuals_.clear();
-  forget_evidence();
+  evidence_.forget();
   second_opinion_.adopt(start);
   since_change_ = 0;
   surprise_ = 0;
@@ -241,48 +232,20 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
 }
 
 template <class Grid>
-void Estimator<Grid>::gather_evidence(const Innovations& innovations) noexcept {
-  const double s2 = scale_ * scale_;
-  const double log_s2 = quick_log(s2);
-  // The credit of the best model, for all: a model that rejected every message as an outlier would
-  // otherwise gather no squares and look perfect.
-  const double credit = innovations.credit[best_];
-  for (std::size_t i = 0; i < kSize; ++i) {
-    const double variance = innovations.variance[i];
-    const double centred = innovations.centred[i];
-    squares_[i] += credit * std::min(centred * centred / variance, kEvidenceLimit) * s2;
-    logs_[i] += credit * (innovations.log_variance[i] - log_s2);
-  }
-  weight_sum_ += credit;
-}
-
-template <class Grid>
-void Estimator<Grid>::forget_evidence() noexcept {
-  weight_sum_ = 0.0;
-  squares_.fill(0.0);
-  logs_.fill(0.0);
-}
-
-template <class Grid>
 void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
-  detector_.add(log_density);
-  std::array<std::size_t, kCalm> source{};
-  bool any = false;
-  for (std::size_t i = 0; i < kCalm; ++i) {
-    source[i] = detector_.take_over(i, static_cast<double>(count_));
-    any = any || source[i] != ChangeDetector<Grid>::kNone;
-  }
-  if (!any) return;
+  const std::uint32_t overtaken = detector_.add(log_density);
   // From calm to wild: every source stands behind its target and still has its own state.
-  for (std::size_t i = 0; i < kCalm; ++i) {
-    if (source[i] == ChangeDetector<Grid>::kNone) continue;
-    bank_.set(i, bank_.estimate(source[i]));
+  for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    const std::size_t source = detector_.take_over(i, static_cast<double>(count_));
+    if (source == ChangeDetector<Grid>::kNone) continue;
+    bank_.set(i, bank_.estimate(source));
     if (i != best_) continue;
     since_change_ = 0;
     if (count_ < kYoung) {  // a bad start must leave no trace
       for (auto& learner : learner_) learner.restart();
       residuals_.clear();
-      forget_evidence();
+      evidence_.forget();
     }
   }
 }
@@ -313,57 +276,31 @@ void Estimator<Grid>::follow_gate(std::size_t side, double credit, double innova
   });
 }
 
-/// c_i = W ln(V_i / W) + L_i: minus twice the log-likelihood with the scale profiled out.
 template <class Grid>
 void Estimator<Grid>::choose() noexcept {
-  if (count_ <= kMixFrom || weight_sum_ <= 0.0) {
-    weight_.fill(0.0);
-    best_ = Grid::kStart;
-    weight_[best_] = 1.0;
+  if (count_ > kMixFrom && evidence_.messages() > 0.0) {
+    best_ = evidence_.weigh(weight_);
     return;
   }
-  typename Bank::Row cost{};
-  const double per_message = 1.0 / weight_sum_;
-  for (std::size_t i = 0; i < kSize; ++i) {
-    const double places = static_cast<double>(i) - static_cast<double>(Grid::kStart);
-    cost[i] = weight_sum_ * quick_log(std::max(squares_[i] * per_message, kSmallestSquare)) +
-              logs_[i] + (places > 0.0 ? kWildnessCost : kCalmGain) * places;
-  }
-  best_ = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
-  double total = 0.0;
-  for (std::size_t i = 0; i < kSize; ++i) {
-    const double behind = 0.5 * (cost[i] - cost[best_]);
-    weight_[i] = behind < kHopeless ? std::exp(-behind) : 0.0;
-    total += weight_[i];
-  }
-  for (double& weight : weight_) weight /= total;
-  if (weight_sum_ > kEvidenceMemory) {
-    const double keep = kEvidenceMemory / weight_sum_;
-    weight_sum_ = kEvidenceMemory;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      squares_[i] *= keep;
-      logs_[i] *= keep;
-    }
-  }
+  weight_.fill(0.0);
+  best_ = Grid::kStart;
+  weight_[best_] = 1.0;
 }
 
 template <class Grid>
 void Estimator<Grid>::mix() noexcept {
   mixed_ = bank_.mixture(weight_, scale_);
-  process_ = {};
-  for (std::size_t i = 0; i < kSize; ++i) {
-    process_.white_fm += weight_[i] * Grid::kModels[i].white_fm;
-    process_.random_walk_fm += weight_[i] * Grid::kModels[i].random_walk_fm;
-  }
+  process_ = bank_.mean_noise(weight_);
 }
 
 template <class Grid>
 void Estimator<Grid>::follow_scale() noexcept {
   robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
-  if (weight_sum_ > 4.0 && squares_[best_] / weight_sum_ > 9.0 * robust_scale_ * robust_scale_) {
+  if (evidence_.messages() > 4.0 &&
+      evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
     // Old gross errors are all that the evidence tells. The model that has coped is right by now;
     // without evidence any other might be chosen.
-    forget_evidence();
+    evidence_.forget();
     const Estimate coped = bank_.estimate(best_);
     if (residuals_.full()) bank_.for_each([&coped](Estimate& e) { e = coped; });
   }
@@ -429,9 +366,7 @@ void Estimator<Grid>::adopt_shapes() noexcept {
 /// outliers are not what one expects on this path.
 template <class Grid>
 void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
-  const double centred = innovations.centred[best_];
-  const double normalised =
-      std::min(centred * centred / innovations.variance[best_], kSurpriseLimit);
+  const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
   const double credit = innovations.credit[best_];
   const double unexpected = std::max(0.0, 1.0 - late_outliers_[side] / kOutlierStart);
   const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);

@@ -7,6 +7,7 @@
 
 #include "ftcs/servo/adaptive/change_detector.h"
 #include "ftcs/servo/adaptive/delay_shape.h"
+#include "ftcs/servo/adaptive/evidence.h"
 #include "ftcs/servo/adaptive/model_bank.h"
 #include "ftcs/servo/adaptive/noise_learner.h"
 #include "ftcs/servo/adaptive/second_opinion.h"
@@ -75,7 +76,6 @@ class Estimator {
 
   void begin(Direction direction) noexcept;
   void connect_second_direction(Direction direction) noexcept;
-  void gather_evidence(const Innovations& innovations) noexcept;
   void detect_changes(const Row& log_density) noexcept;
   void follow_gate(std::size_t side, double credit, double innovation) noexcept;
   void choose() noexcept;
@@ -83,7 +83,6 @@ class Estimator {
   void follow_scale() noexcept;
   void learn_noise(std::size_t side, double innovation) noexcept;
   void adopt_shapes() noexcept;
-  void forget_evidence() noexcept;
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
@@ -103,10 +102,8 @@ class Estimator {
   SortedWindow<Grid::kResidualWindow> residuals_{};
   SecondOpinion<Grid::kOpinionWindow> second_opinion_{};
 
-  typename Bank::Row squares_{};  ///< V: credited normalised squares, ns^2
-  typename Bank::Row logs_{};     ///< L: credited ln of normalised variance
-  double weight_sum_ = 0.0;       ///< W: credited messages
-  typename Bank::Row weight_{};
+  Evidence<Grid> evidence_{};
+  Row weight_{};
   std::size_t best_ = Grid::kStart;
   std::uint32_t count_ = 0;
   std::uint32_t since_change_ = 0;

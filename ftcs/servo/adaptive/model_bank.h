@@ -7,8 +7,9 @@
 #include <cstddef>
 
 #include "ftcs/servo/adaptive/delay_shape.h"
+#include "ftcs/servo/adaptive/lanes.h"
 #include "ftcs/servo/adaptive/noise_model.h"
-#include "ftcs/servo/adaptive/quick_log.h"
+#include "ftcs/servo/adaptive/quick_math.h"
 
 namespace ftcs::adaptive {
 
@@ -51,6 +52,7 @@ class ModelBank {
   struct Innovations {
     Row centred;      ///< nu less the mean delay noise, ns
     Row variance;     ///< its predicted variance, ns^2
+    Row distance;     ///< centred^2 / variance
     Row predicted;    ///< h P h', units of s^2
     Row log_density;  ///< outliers included
     Row log_variance;
@@ -75,19 +77,26 @@ class ModelBank {
   [[nodiscard]] bool predict(double elapsed, std::size_t trusted) noexcept {
     const double t = elapsed;
     const double span = std::abs(elapsed);
-    double largest = 0.0;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const NoiseModel& model = Grid::kModels[i];
-      x_[i] += y_[i] * t;
-      xx_[i] += 2.0 * t * xy_[i] + t * t * yy_[i] + model.white_fm * span +
-                model.random_walk_fm * span * span * span / 3.0;
-      xy_[i] += t * yy_[i] + model.random_walk_fm * t * span / 2.0;
-      xd_[i] += t * yd_[i];
-      yy_[i] += model.random_walk_fm * span;
-      dd_[i] += (kDelayWalk + model.delay_walk) * span;
-      largest = std::max(largest, std::max(std::max(xx_[i], yy_[i]), dd_[i]));
+    const double cube = span * span * span / 3.0;
+    V wildest{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V white = load<V>(&kWhiteFm[i]);
+      const V walk = load<V>(&kRandomWalkFm[i]);
+      const V y = load<V>(&y_[i]);
+      const V xy = load<V>(&xy_[i]);
+      const V yy = load<V>(&yy_[i]);
+      store(&x_[i], load<V>(&x_[i]) + y * t);
+      const V xx = load<V>(&xx_[i]) + 2.0 * t * xy + t * t * yy + white * span + walk * cube;
+      store(&xx_[i], xx);
+      store(&xy_[i], xy + t * yy + walk * (t * span / 2.0));
+      store(&xd_[i], load<V>(&xd_[i]) + t * load<V>(&yd_[i]));
+      const V grown = yy + walk * span;
+      store(&yy_[i], grown);
+      const V dd = load<V>(&dd_[i]) + load<V>(&kDelayWalks[i]) * span;
+      store(&dd_[i], dd);
+      wildest = larger(wildest, larger(larger(xx, grown), dd));
     }
-    if (largest <= kLargestVariance) return true;
+    if (largest(wildest) <= kLargestVariance) return true;
     const bool lost = !(std::max(xx_[trusted], yy_[trusted]) <= kLargestVariance);
     contain();
     return !lost;
@@ -99,47 +108,56 @@ class ModelBank {
     const double s2 = scale * scale;
     const double tail = scale * shape.tail;
     Innovations out;
-    bool suspicious = false;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double predicted = xx_[i] + 2.0 * seen.sign * xd_[i] + dd_[i];
-      const double variance = s2 * (predicted + shape.variance) + tail * tail;
-      const double centred = seen.sign * (seen.z - x_[i]) - d_[i] - tail;
-      const double curvature = 1.0 / variance;
-      out.centred[i] = centred;
-      out.variance[i] = variance;
-      out.predicted[i] = predicted;
-      out.slope[i] = centred * curvature;
-      out.curvature[i] = curvature;
-      out.credit[i] = 1.0;
-    }
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double distance = out.centred[i] * out.slope[i];
-      out.log_variance[i] = quick_log(out.variance[i]);
-      out.log_density[i] = -0.5 * (distance + out.log_variance[i] + kLn2Pi);
-      suspicious |= distance > kSuspicious;
+    V furthest{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V predicted = load<V>(&xx_[i]) + 2.0 * seen.sign * load<V>(&xd_[i]) + load<V>(&dd_[i]);
+      const V variance = s2 * (predicted + shape.variance) + tail * tail;
+      const V centred = seen.sign * (seen.z - load<V>(&x_[i])) - load<V>(&d_[i]) - tail;
+      const V curvature = 1.0 / variance;
+      const V slope = centred * curvature;
+      const V distance = centred * slope;
+      const V log_variance = quick_log(variance);
+      store(&out.centred[i], centred);
+      store(&out.variance[i], variance);
+      store(&out.distance[i], distance);
+      store(&out.predicted[i], predicted);
+      store(&out.log_variance[i], log_variance);
+      store(&out.log_density[i], -0.5 * (distance + log_variance + kLn2Pi));
+      store(&out.credit[i], V{} + 1.0);
+      store(&out.slope[i], slope);
+      store(&out.curvature[i], curvature);
+      furthest = larger(furthest, distance);
     }
     if (tail > 0.0) judge_late(s2 * shape.variance, s2, tail, out);
-    if (gate && suspicious) doubt(outliers, out);
+    if (gate && largest(furthest) > kSuspicious) doubt(outliers, out);
     return out;
   }
 
   void correct(const Observation& seen, double scale, const Innovations& innovations) noexcept {
     const double s2 = scale * scale;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double hx = xx_[i] + seen.sign * xd_[i];
-      const double hy = xy_[i] + seen.sign * yd_[i];
-      const double hd = xd_[i] + seen.sign * dd_[i];
-      const double move = seen.sign * innovations.slope[i] * s2;
-      const double shrink = innovations.curvature[i] * s2;
-      x_[i] += hx * move;
-      y_[i] += hy * move;
-      d_[i] += hd * move;
-      xx_[i] -= hx * hx * shrink;
-      xy_[i] -= hx * hy * shrink;
-      xd_[i] -= hx * hd * shrink;
-      yy_[i] -= hy * hy * shrink;
-      yd_[i] -= hy * hd * shrink;
-      dd_[i] -= hd * hd * shrink;
+    const double sign = seen.sign;
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V xd = load<V>(&xd_[i]);
+      const V yd = load<V>(&yd_[i]);
+      const V dd = load<V>(&dd_[i]);
+      const V xx = load<V>(&xx_[i]);
+      const V xy = load<V>(&xy_[i]);
+      const V hx = xx + sign * xd;
+      const V hy = xy + sign * yd;
+      const V hd = xd + sign * dd;
+      const V move = load<V>(&innovations.slope[i]) * (sign * s2);
+      const V shrink = load<V>(&innovations.curvature[i]) * s2;
+      const V shrink_x = hx * shrink;
+      const V shrink_y = hy * shrink;
+      store(&x_[i], load<V>(&x_[i]) + hx * move);
+      store(&y_[i], load<V>(&y_[i]) + hy * move);
+      store(&d_[i], load<V>(&d_[i]) + hd * move);
+      store(&xx_[i], xx - hx * shrink_x);
+      store(&xy_[i], xy - hy * shrink_x);
+      store(&xd_[i], xd - hd * shrink_x);
+      store(&yy_[i], load<V>(&yy_[i]) - hy * shrink_y);
+      store(&yd_[i], yd - hd * shrink_y);
+      store(&dd_[i], dd - hd * hd * shrink);
     }
   }
 
@@ -159,20 +177,20 @@ class ModelBank {
   }
   /// Every state finite and every covariance positive.
   [[nodiscard]] bool healthy() const noexcept {
-    double sum = 0.0;
-    double least = 1.0;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const Health health = health_of(i);
+    V sum{};
+    V smallest = V{} + 1.0;
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const auto health = health_of<V>(i);
       sum += health.finite;
-      least = std::min(least, health.positive);
+      smallest = lesser(smallest, health.positive);
     }
-    return sum == 0.0 && least > 0.0;
+    return total(sum) == 0.0 && least(smallest) > 0.0;
   }
   /// Models that rounding or absurd input has broken take the state of `donor`, or of the first
   /// that is whole. False: there is none.
   [[nodiscard]] bool heal(std::size_t donor) noexcept {
     const auto whole = [this](std::size_t i) {
-      const Health health = health_of(i);
+      const auto health = health_of<double>(i);
       return health.finite == 0.0 && health.positive > 0.0;
     };
     for (std::size_t i = 0; i < kSize && !whole(donor); ++i) donor = i;
@@ -195,45 +213,81 @@ class ModelBank {
   /// Mean of all models under the given weights (sum one), and the covariance of that mixture
   /// (between-model spread included; ns^2 of it brought to units of s^2).
   [[nodiscard]] Estimate mixture(const Row& weight, double scale) const noexcept {
+    V x{}, y{}, d{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V w = load<V>(&weight[i]);
+      if (total(w) == 0.0) continue;  // most of them
+      x += w * load<V>(&x_[i]);
+      y += w * load<V>(&y_[i]);
+      d += w * load<V>(&d_[i]);
+    }
     Estimate mean;
-    for (std::size_t i = 0; i < kSize; ++i) {
-      if (weight[i] == 0.0) continue;  // most of them
-      mean.x += weight[i] * x_[i];
-      mean.y += weight[i] * y_[i];
-      mean.d += weight[i] * d_[i];
-    }
+    mean.x = total(x);
+    mean.y = total(y);
+    mean.d = total(d);
     const double per_s2 = 1.0 / (scale * scale);
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double w = weight[i];
-      if (w == 0.0) continue;
-      const double dx = x_[i] - mean.x;
-      const double dy = y_[i] - mean.y;
-      const double dd = d_[i] - mean.d;
-      mean.xx += w * (xx_[i] + dx * dx * per_s2);
-      mean.xy += w * (xy_[i] + dx * dy * per_s2);
-      mean.xd += w * (xd_[i] + dx * dd * per_s2);
-      mean.yy += w * (yy_[i] + dy * dy * per_s2);
-      mean.yd += w * (yd_[i] + dy * dd * per_s2);
-      mean.dd += w * (dd_[i] + dd * dd * per_s2);
+    V xx{}, xy{}, xd{}, yy{}, yd{}, dd{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V w = load<V>(&weight[i]);
+      if (total(w) == 0.0) continue;
+      const V dx = load<V>(&x_[i]) - mean.x;
+      const V dy = load<V>(&y_[i]) - mean.y;
+      const V dz = load<V>(&d_[i]) - mean.d;
+      xx += w * (load<V>(&xx_[i]) + dx * dx * per_s2);
+      xy += w * (load<V>(&xy_[i]) + dx * dy * per_s2);
+      xd += w * (load<V>(&xd_[i]) + dx * dz * per_s2);
+      yy += w * (load<V>(&yy_[i]) + dy * dy * per_s2);
+      yd += w * (load<V>(&yd_[i]) + dy * dz * per_s2);
+      dd += w * (load<V>(&dd_[i]) + dz * dz * per_s2);
     }
+    mean.xx = total(xx);
+    mean.xy = total(xy);
+    mean.xd = total(xd);
+    mean.yy = total(yy);
+    mean.yd = total(yd);
+    mean.dd = total(dd);
     return mean;
   }
+
+  /// Mean of the models' noise under the given weights (the delay's walk left out).
+  [[nodiscard]] NoiseModel mean_noise(const Row& weight) const noexcept {
+    V white{}, walk{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      white += load<V>(&weight[i]) * load<V>(&kWhiteFm[i]);
+      walk += load<V>(&weight[i]) * load<V>(&kRandomWalkFm[i]);
+    }
+    return {total(white), total(walk), 0.0};
+  }
+
+  /// The models' parameters, one kind in a row.
+  static constexpr Row kWhiteFm = column(Grid::kModels, &NoiseModel::white_fm);
+  static constexpr Row kRandomWalkFm = column(Grid::kModels, &NoiseModel::random_walk_fm);
 
   /// Beyond it a model knows nothing, and its variance after the next message would be rounding.
   static constexpr double kLargestVariance = 1e11;
 
  private:
+  using V = typename LanesOf<kSize>::Type;
+  static constexpr std::size_t kStep = kLanes<V>;
+
   /// `finite` is zero or not a number; `positive` is the least of what has to be above zero.
+  template <class Lane>
   struct Health {
-    double finite, positive;
+    Lane finite, positive;
   };
-  [[nodiscard]] Health health_of(std::size_t i) const noexcept {
+  template <class Lane>
+  [[nodiscard]] Health<Lane> health_of(std::size_t i) const noexcept {
+    const auto at = [i](const Row& row) { return load<Lane>(&row[i]); };
+    const Lane xx = at(xx_);
+    const Lane xy = at(xy_);
+    const Lane xd = at(xd_);
+    const Lane yy = at(yy_);
+    const Lane dd = at(dd_);
     // Not finite times zero is not a number, which no comparison survives.
-    const double finite =
-        0.0 * (x_[i] + y_[i] + d_[i] + xx_[i] + yy_[i] + dd_[i] + xy_[i] + xd_[i] + yd_[i]);
-    const double minors = std::min(xx_[i] * yy_[i] - xy_[i] * xy_[i],
-                                   xx_[i] * (dd_[i] + kDelayWalk) - xd_[i] * xd_[i]);
-    return {finite, std::min(std::min(xx_[i], yy_[i]), std::min(dd_[i] + kDelayWalk, minors))};
+    const Lane finite = 0.0 * (at(x_) + at(y_) + at(d_) + xx + yy + dd + xy + xd + at(yd_));
+    const Lane pinned = dd + kDelayWalk;
+    const Lane minors = lesser<Lane>(xx * yy - xy * xy, xx * pinned - xd * xd);
+    return {finite, lesser(lesser(xx, yy), lesser(pinned, minors))};
   }
   /// A covariance that is too large shrinks as a whole, so that it stays a covariance.
   void contain() noexcept {
@@ -255,6 +309,7 @@ class ModelBank {
   /// Two sigma: below it the outlier hypothesis cannot win, so its density is not worth computing.
   static constexpr double kSuspicious = 4.0;
 
+  static constexpr double kLeastLogDensity = -700.0;
   static constexpr double kLn2Pi = 1.8378770664093453;
 
   /// Queueing noise: slope, curvature and density of the late shape.
@@ -270,19 +325,29 @@ class ModelBank {
 
   /// The outlier hypothesis: density probability / (10 |centred|), broad and scale-free.
   static void doubt(const OutlierPrior& outliers, Innovations& out) noexcept {
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double centred = out.centred[i];
-      if (centred * centred <= kSuspicious * out.variance[i]) continue;
-      const double probability = centred > 0.0 ? outliers.late : outliers.early;
-      const double outlier =
-          probability / (10.0 * std::max(std::abs(centred), 3.0 * std::sqrt(out.variance[i])));
-      const double density = std::exp(out.log_density[i]);
-      out.credit[i] = density / (density + outlier);
-      out.log_density[i] = std::log(density + outlier);
-      out.slope[i] *= out.credit[i];
-      out.curvature[i] *= out.credit[i];
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V distance = load<V>(&out.distance[i]);
+      if (largest(distance) <= kSuspicious) continue;
+      const V centred = load<V>(&out.centred[i]);
+      const V late = V{} + outliers.late;
+      const V early = V{} + outliers.early;
+      const V probability = centred > 0.0 ? late : early;
+      const V size = larger<V>(magnitude(centred), 3.0 * root(load<V>(&out.variance[i])));
+      const V outlier = probability / (10.0 * size);
+      const V log_density = load<V>(&out.log_density[i]);
+      const V density = quick_exp(larger<V>(log_density, V{} + kLeastLogDensity));
+      const V mixed = density + outlier;
+      const V near = V{} + kSuspicious;
+      const V one = V{} + 1.0;
+      const V credit = distance > near ? density / mixed : one;
+      store(&out.credit[i], credit);
+      store(&out.log_density[i], distance > near ? quick_log(mixed) : log_density);
+      store(&out.slope[i], load<V>(&out.slope[i]) * credit);
+      store(&out.curvature[i], load<V>(&out.curvature[i]) * credit);
     }
   }
+
+  static constexpr Row kDelayWalks = column(Grid::kModels, &NoiseModel::delay_walk, kDelayWalk);
 
   Row x_{}, y_{}, d_{}, xx_{}, xy_{}, xd_{}, yy_{}, yd_{}, dd_{};
 };

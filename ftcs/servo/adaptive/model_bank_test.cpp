@@ -135,11 +135,5 @@ TEST(ModelBank, mixture_contains_the_spread_between_the_models) {
   EXPECT_DOUBLE_EQ(mixed.xx, 1.0 + 100.0 / 4.0);
 }
 
-TEST(QuickLog, agrees_with_the_library) {
-  for (double x = 1e-30; x < 1e40; x *= 1.037) {
-    EXPECT_NEAR(quick_log(x), std::log(x), 1e-8) << x;
-  }
-}
-
 }  // namespace
 }  // namespace ftcs::adaptive

@@ -14,6 +14,16 @@ struct NoiseModel {
   double delay_walk = 0.0;      ///< variance added to the path delay per cycle
 };
 
+/// One parameter of all models, plus `added`.
+template <std::size_t size>
+[[nodiscard]] constexpr std::array<double, size> column(const std::array<NoiseModel, size>& models,
+                                                        double NoiseModel::*parameter,
+                                                        double added = 0.0) noexcept {
+  std::array<double, size> values{};
+  for (std::size_t i = 0; i < size; ++i) values[i] = models[i].*parameter + added;
+  return values;
+}
+
 /// The full bank, ordered from calm to wild: a model may take over the state of any model behind
 /// it. Random-walk FM by decades: the gain of a filter goes with b^(1/4), so that half a decade off
 /// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
