@@ -123,28 +123,29 @@ void MonitorReceiver::read_reports() {
   for (int i = 0; i < kReportsAtOnce; ++i) {
     const auto datagram = socket_->receive();
     if (!datagram) return;
-    const auto before = source_.transmitter();
-    const auto events = source_.on_datagram(datagram->bytes);
-    if (events.size > 0) last_report_ = now();
-    if (source_.transmitter() != before) {
-      log()(LogLevel::kNotice, "ptp4l: samples of the transmitter {}",
-            to_text(*source_.transmitter()).view());
-    }
-    for (const auto& event : events) on_sample(event);
+    const ptp::MonitorReport report = source_.on_datagram(datagram->bytes);
+    if (report.size > 0) last_report_ = now();
+    for (const ptp::MonitorSample& sample : report.view()) on_sample(sample);
   }
 }
 
-void MonitorReceiver::on_sample(const ptp::MonitorSource::Event& event) {
-  if (event.new_reference) {
+// ptp4l's stamps are readings of the clock that is steered here: its steps are none of the
+// reference.
+void MonitorReceiver::on_sample(const ptp::MonitorSample& sample) {
+  const auto stamp = timestamps().convert({sample.local_ns, sample.local_ns});
+  if (!stamp) return;  // the clock was set in between: counted there
+  const auto before = source_.transmitter();
+  const auto event = source_.on_sample(sample, oscillator().from_underlying(stamp->time));
+  if (!event) return;
+  if (source_.transmitter() != before) {
+    log()(LogLevel::kNotice, "ptp4l: samples of the transmitter {}",
+          to_text(*source_.transmitter()).view());
+  }
+  if (event->new_reference) {
     log()(LogLevel::kWarning, "ptp4l: another transmitter, or its time jumped; starting anew");
     follower_.on_new_reference();
   }
-  const ptp::MonitorSample& sample = event.sample;
-  const auto stamp = timestamps().convert({sample.local_ns, sample.local_ns});
-  if (!stamp) return;  // CLOCK_REALTIME was set in between: counted there
-  const EventPair pair{sample.direction, sample.reference,
-                       oscillator().from_underlying(stamp->time)};
-  if (const auto wrong = follower_.on_pair(pair, now(), source_.sync_interval()))
+  if (const auto wrong = follower_.on_pair(event->pair, now(), source_.sync_interval()))
     return fail(*wrong);
   feed_others(follower_);
 }

@@ -49,7 +49,7 @@ class MonitorReceiver final : public PtpPort, private Managed {
   void read_reports();
   void ask_for_timescale(FreeRunningTime now);
   void ask_for_link_delay(FreeRunningTime now);
-  void on_sample(const ptp::MonitorSource::Event& event);
+  void on_sample(const ptp::MonitorSample& sample);
   void watch_for_silence(FreeRunningTime now);
   void log_lock();
   [[nodiscard]] ptp::PortState state() const;

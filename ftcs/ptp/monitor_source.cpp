@@ -15,37 +15,38 @@ constexpr int kLargestGap = 64;
 
 }  // namespace
 
-MonitorSource::Events MonitorSource::on_datagram(std::span<const std::uint8_t> bytes) noexcept {
-  Events events;
+MonitorReport MonitorSource::on_datagram(std::span<const std::uint8_t> bytes) noexcept {
   const auto report = decode_monitor(bytes);
   if (!report) {
     ++counters_.malformed;
-    return events;
+    return {};
   }
   counters_.unknown_tlvs += report->unknown_tlvs;
-  for (const MonitorSample& sample : report->view()) {
-    Event event{sample};
-    if (!transmitter_ || *transmitter_ != sample.transmitter) {
-      event.new_reference = transmitter_.has_value();
-      if (event.new_reference) ++counters_.transmitter_changes;
-      transmitter_ = sample.transmitter;
-      forget();
-    } else if (!in_order(sample)) {
-      continue;
-    } else if (is_new_reference(sample)) {
-      event.new_reference = true;
-      ++counters_.reference_jumps;
-      forget();
-    }
-    Last& last = last_of(sample.direction);
-    if (sample.direction == Direction::kForward && last.known) {
-      interval_ = sample.reference - last.reference;
-    }
-    last = {true, sample.sequence_id, sample.reference, sample.local_ns};
-    ++(sample.direction == Direction::kForward ? counters_.syncs : counters_.delays);
-    events.events[events.size++] = event;
+  return *report;
+}
+
+std::optional<MonitorSource::Event> MonitorSource::on_sample(const MonitorSample& sample,
+                                                             FreeRunningTime local) noexcept {
+  Event event{{sample.direction, sample.reference, local}};
+  if (!transmitter_ || *transmitter_ != sample.transmitter) {
+    event.new_reference = transmitter_.has_value();
+    if (event.new_reference) ++counters_.transmitter_changes;
+    transmitter_ = sample.transmitter;
+    forget();
+  } else if (!in_order(sample)) {
+    return std::nullopt;
+  } else if (is_new_reference(event.pair)) {
+    event.new_reference = true;
+    ++counters_.reference_jumps;
+    forget();
   }
-  return events;
+  Last& last = last_of(sample.direction);
+  if (sample.direction == Direction::kForward && last.known) {
+    interval_ = sample.reference - last.pair.reference;
+  }
+  last = {true, sample.sequence_id, sample.local_ns, event.pair};
+  ++(sample.direction == Direction::kForward ? counters_.syncs : counters_.delays);
+  return event;
 }
 
 bool MonitorSource::in_order(const MonitorSample& sample) noexcept {
@@ -64,12 +65,11 @@ bool MonitorSource::in_order(const MonitorSample& sample) noexcept {
   return true;
 }
 
-bool MonitorSource::is_new_reference(const MonitorSample& sample) noexcept {
-  const Last& last = last_of(sample.direction);
+bool MonitorSource::is_new_reference(const EventPair& pair) noexcept {
+  const Last& last = last_of(pair.direction);
   if (!last.known) return false;
-  const Duration elapsed =
-      Duration::from_whole_ns(sample.local_ns) - Duration::from_whole_ns(last.local_ns);
-  const Duration jump = (sample.reference - last.reference) - elapsed;
+  const Duration elapsed = pair.free_running - last.pair.free_running;
+  const Duration jump = (pair.reference - last.pair.reference) - elapsed;
   return abs(jump) > Duration{kTolerance} + abs(elapsed).half().half().half();
 }
 

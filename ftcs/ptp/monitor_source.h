@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 
 #include "ftcs/ptp/wire/monitor.h"
+#include "ftcs/time/timestamp_pair.h"
 
 namespace ftcs::ptp {
 
@@ -25,23 +25,23 @@ struct MonitorCounters {
 /// What the reports of another time receiver come to: samples in order, gaps and repetitions
 /// counted, a change of the reference noticed.
 ///
-/// Sans-I/O: datagrams go in, samples come out; their local stamps are readings of whichever clock
-/// the reporter uses. No heap, bounded time.
+/// Sans-I/O: datagrams go in, samples come out. Their local stamps are readings of whichever clock
+/// the reporter uses, and that clock may be steered and stepped: whoever knows it puts them onto
+/// its free-running timescale in between. No heap, bounded time.
 class MonitorSource {
  public:
+  /// The samples as they were reported; none of a datagram that cannot be read.
+  [[nodiscard]] MonitorReport on_datagram(std::span<const std::uint8_t> bytes) noexcept;
+
   struct Event {
-    MonitorSample sample{};
+    EventPair pair{};
     /// What was learnt before this sample belongs to another reference.
     bool new_reference = false;
   };
-  struct Events {
-    std::array<Event, MonitorReport::kCapacity> events{};
-    std::uint8_t size = 0;
-    [[nodiscard]] const Event* begin() const noexcept { return events.data(); }
-    [[nodiscard]] const Event* end() const noexcept { return events.data() + size; }
-  };
-
-  [[nodiscard]] Events on_datagram(std::span<const std::uint8_t> bytes) noexcept;
+  /// `local`: the sample's local stamp on a timescale that nobody steers; only there can a jump of
+  /// the reference be told from a step of the clock. No value: the same message as before.
+  [[nodiscard]] std::optional<Event> on_sample(const MonitorSample& sample,
+                                               FreeRunningTime local) noexcept;
 
   [[nodiscard]] const MonitorCounters& counters() const noexcept { return counters_; }
   /// The port that the last sample came from.
@@ -56,13 +56,13 @@ class MonitorSource {
   struct Last {
     bool known = false;
     std::uint16_t sequence_id = 0;
-    ReferenceTime reference{};
-    std::int64_t local_ns = 0;
+    std::int64_t local_ns = 0;  ///< as reported
+    EventPair pair{};
   };
 
   /// False: the same message as before.
   [[nodiscard]] bool in_order(const MonitorSample& sample) noexcept;
-  [[nodiscard]] bool is_new_reference(const MonitorSample& sample) noexcept;
+  [[nodiscard]] bool is_new_reference(const EventPair& pair) noexcept;
   void forget() noexcept;
   [[nodiscard]] Last& last_of(Direction direction) noexcept {
     return direction == Direction::kForward ? last_sync_ : last_delay_;

@@ -100,11 +100,12 @@ int run(const std::string& path, double seconds) {
   while (timestamps.source().now() < end) {
     socket->wait(100);
     while (const auto datagram = socket->receive()) {
-      for (const auto& event : reports.on_datagram(datagram->bytes)) {
-        const auto stamp = timestamps.convert({event.sample.local_ns, 0});
+      const ptp::MonitorReport report = reports.on_datagram(datagram->bytes);
+      for (const ptp::MonitorSample& sample : report.view()) {
+        const auto stamp = timestamps.convert({sample.local_ns, 0});
         if (!stamp) continue;
-        trials.on_pair(
-            {event.sample.direction, event.sample.reference, source.from_underlying(stamp->time)});
+        const auto event = reports.on_sample(sample, source.from_underlying(stamp->time));
+        if (event) trials.on_pair(event->pair);
       }
     }
   }
