@@ -103,9 +103,10 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
   clock_refuses_ = telemetry.error.has_value();
   if (telemetry.offset_refused) {
     return fmt::format(
-        "the first offset is {:.3f} s, more than {} s: set the clock near the "
-        "reference (--offset) or allow one step (--first-step)",
-        telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9);
+        "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or allow "
+        "one step (--first-step)",
+        telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9,
+        options_.clock == ClockKind::kVirtual ? " (--offset)" : "");
   }
   const double time_s = (now - start_).seconds();
   const bool used = telemetry.verdict == SampleVerdict::kUsed;

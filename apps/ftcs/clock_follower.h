@@ -35,6 +35,8 @@ class ClockFollower {
   void on_silence();
   /// Another reference: what was learnt about the old one is void.
   void on_new_reference() { discipline_.on_new_reference(); }
+  /// The clock was put onto another timescale: begins anew, the bound of the first offset included.
+  void on_new_timescale() { discipline_.on_new_timescale(); }
   /// At the end: the summary's lines; what was learnt goes to the driftfile.
   void log_summary();
 

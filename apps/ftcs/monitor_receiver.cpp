@@ -81,7 +81,7 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
     const auto wrong =
         real_clock()->attend(steering, follower_.locked(), follower_.discipline().latest().servo);
     if (wrong) fail(*wrong);
-    if (real_clock()->take_scale_change()) follower_.on_new_reference();
+    if (real_clock()->take_scale_change()) follower_.on_new_timescale();
   }
   watch_for_silence(now);
   log_lock();

@@ -109,7 +109,7 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
                                                 discipline.locked(), discipline.latest().servo)) {
       return fail(*wrong);
     }
-    if (real_clock()->take_scale_change()) follower_.on_new_reference();
+    if (real_clock()->take_scale_change()) follower_.on_new_timescale();
   }
   if (!follower_.locked()) follow_lock(false);  // only a sample can say that it is locked again
 }

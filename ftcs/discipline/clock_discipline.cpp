@@ -59,6 +59,11 @@ void ClockDiscipline::on_new_reference() noexcept {
   finish();
 }
 
+void ClockDiscipline::on_new_timescale() noexcept {
+  first_command_ = true;
+  on_new_reference();
+}
+
 void ClockDiscipline::begin(const ClockReading& reading) noexcept {
   telemetry_.reading = reading;
   telemetry_.commanded = false;

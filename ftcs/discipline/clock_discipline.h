@@ -39,6 +39,9 @@ class ClockDiscipline {
   Telemetry on_silence() noexcept;
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
+  /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:
+  /// step policy and largest_first_offset are asked again as with the first offset.
+  void on_new_timescale() noexcept;
 
   [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
   [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }

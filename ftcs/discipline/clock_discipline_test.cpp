@@ -318,6 +318,31 @@ TEST_F(ClockDisciplineTest, refuses_an_absurd_first_offset) {
   EXPECT_NEAR(offset_ns(), 0.0, 1e-3);
 }
 
+TEST_F(ClockDisciplineTest, another_timescale_is_a_beginning_and_another_transmitter_is_none) {
+  for (const bool may_step : {false, true}) {
+    for (const bool timescale : {false, true}) {
+      DisciplineConfig config = config_for(ServoKind::kFtcs);
+      config.largest_first_offset = 1s;
+      config.step.mode = may_step ? StepMode::kFirst : StepMode::kNever;
+      reference_jump_ = Duration{};
+      start(Nanoseconds{10us}, config);
+      for (int n = 0; n < 8; ++n) sync_and_wait();
+      const std::uint64_t steps = discipline_->counters().steps;
+      if (timescale) {
+        discipline_->on_new_timescale();
+      } else {
+        discipline_->on_new_reference();
+      }
+      reference_jump_ = Nanoseconds{-2s};
+      sync_and_wait();
+      const Telemetry telemetry = sync_and_wait();
+      EXPECT_EQ(telemetry.offset_refused, timescale && !may_step);
+      EXPECT_EQ(discipline_->counters().steps - steps, timescale && may_step ? 1U : 0U);
+      EXPECT_EQ(discipline_->counters().new_references, 1U);
+    }
+  }
+}
+
 TEST_F(ClockDisciplineTest, no_rate_beyond_either_limit_reaches_the_clock) {
   DisciplineConfig config = config_for(ServoKind::kFtcs);
   config.servo.limits = {Rate::from_ppm(-1000.0), Rate::from_ratio(1.5)};

@@ -9,7 +9,7 @@ namespace ftcs {
 
 enum class StepMode : std::uint8_t {
   kNever,   ///< the clock stays continuous; a step that a servo asks for is left out
-  kFirst,   ///< only with the first command
+  kFirst,   ///< only with the first command, and with the first on another timescale
   kAlways,  ///< with any command
 };
 

@@ -106,7 +106,12 @@ void PhcRunner::set_scale(const ReferenceScale& scale) {
   if (sink_->is_system()) return sink_->set_reference_scale(scale);
   if (!source_.is_system()) return;
   const int ahead = scale.tai ? scale.utc_offset.value_or(UtcConfig{}.utc_offset) : 0;
-  sink_->clock().set_timescale_offset(Duration::from_whole_ns(-ahead * kNsPerSecond));
+  const Duration offset = Duration::from_whole_ns(-ahead * kNsPerSecond);
+  if (offset == sink_->clock().timescale_offset()) return;
+  sink_->clock().set_timescale_offset(offset);
+  if (discipline_.counters().commands == 0) return;
+  log_(LogLevel::kWarning, "{}: the reference is {} s ahead of UTC now", sink_->name(), ahead);
+  discipline_.on_new_timescale();
 }
 
 bool PhcRunner::may_follow() {
@@ -149,7 +154,7 @@ int PhcRunner::run() {
     const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
                                      discipline_.latest().servo);
     if (wrong) fail(*wrong);
-    if (sink_->take_scale_change()) discipline_.on_new_reference();
+    if (sink_->take_scale_change()) discipline_.on_new_timescale();
   }
   sink_->stop();
   if (failure_) {

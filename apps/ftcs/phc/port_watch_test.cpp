@@ -37,7 +37,8 @@ struct FakePtpProgram {
         properties.interface = ptp::PtpText<32>("eth0");
         answer.data = properties;
       } else {
-        answer.data = ptp::TimePropertiesDataSet{37, 0x0C, 0xA0};  // PTP timescale, offset valid
+        answer.data =
+            ptp::TimePropertiesDataSet{utc_offset, 0x0C, 0xA0};  // PTP timescale, offset valid
       }
       (void)socket.send(datagram->sender, ptp::encode_management(answer).view());
     }
@@ -49,6 +50,7 @@ struct FakePtpProgram {
   platform::LocalSocket socket;
   PortState state = PortState::kUncalibrated;
   bool hardware = true;
+  std::int16_t utc_offset = 37;
   bool silent = false;
 };
 
@@ -90,6 +92,26 @@ TEST(PortWatch, the_system_clock_follows_the_clock_of_the_port_once_it_receives_
   EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kSuccess);
   EXPECT_FALSE(touched_early);
   EXPECT_NEAR(world.difference(), 0.0, 50.0) << "UTC by the port's own offset";
+}
+
+TEST(PortWatch, another_utc_offset_is_another_beginning_and_may_be_stepped) {
+  for (const bool to_system : {true, false}) {
+    World world;
+    world.options.automatic = false;
+    world.options.wait_for_port = true;
+    world.options.source = to_system ? "/dev/ptp0" : "CLOCK_REALTIME";
+    world.options.sink = to_system ? "CLOCK_REALTIME" : "/dev/ptp0";
+    world.program.state = PortState::kTimeReceiver;
+    double settled_at_s = 0.0;
+    world.on_turn = [&] {
+      if (world.kernel.ideal_ns > 15e9) world.program.utc_offset = 34;
+      const double away = std::abs(world.difference() + 3e9);  // 34 s: 3 s less than before
+      if (away > 1'000.0) settled_at_s = world.kernel.ideal_ns / 1e9;
+    };
+    EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kSuccess);
+    EXPECT_NEAR(world.difference(), -3e9, 100.0) << to_system;
+    EXPECT_LT(settled_at_s, 20.0) << "no slew over three seconds";
+  }
 }
 
 TEST(PortWatch, a_port_that_stops_receiving_is_not_followed) {
