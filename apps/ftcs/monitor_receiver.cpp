@@ -14,32 +14,14 @@ constexpr Duration kPatience{std::chrono::seconds{10}};
 // Two-way samples are rarer than Syncs.
 constexpr std::uint64_t kSyncsWithoutDelay = 32;
 constexpr int kReportsAtOnce = 64;
-// For an answer of ptp4l: before there is anything to steer, and while a clock is being steered.
+constexpr int kAnswersAtOnce = 16;
+// For an answer of ptp4l before anything runs, and once its reports come.
 constexpr int kPatienceMs = 500;
-constexpr int kSoonMs = 30;
+constexpr Duration kAnswerPatience{std::chrono::seconds{2}};
+constexpr std::uint8_t kPeerToPeer = 2;  // portDS.delayMechanism
 
-/// What the ptp4l that serves this management socket says, if it answers.
-template <class Data>
-std::optional<Data> ask_ptp4l(const PtpOptions& options, ptp::ManagementId id, int patience_ms) {
-  auto client = platform::LocalSocket::client();
-  if (!client) return std::nullopt;
-  ptp::ManagementMessage question;
-  question.header.domain = options.domain;
-  question.header.major_sdo_id = options.major_sdo_id;
-  question.header.minor_version = 0;  // every version of linuxptp takes it
-  question.body.target.clock.octets.fill(0xFF);
-  question.body.target.port = 0xFFFF;
-  question.id = id;
-  if (client->send(options.ptp4l_socket, ptp::encode_management(question).view())) {
-    return std::nullopt;
-  }
-  client->wait(patience_ms);
-  const auto answer = client->receive();
-  if (!answer) return std::nullopt;
-  const auto message = ptp::decode_management(answer->bytes);
-  if (!message || !message->data) return std::nullopt;
-  const auto* data = std::get_if<Data>(&*message->data);
-  return data != nullptr ? std::optional(*data) : std::nullopt;
+PortAddress ptp4l_address(const PtpOptions& options) {
+  return {options.ptp4l_socket, options.domain, options.major_sdo_id};
 }
 
 }  // namespace
@@ -56,6 +38,10 @@ std::optional<platform::OsError> MonitorReceiver::open_source() {
   if (!socket) return socket.error();
   socket_.emplace(std::move(*socket));
   transport().watch(socket_->descriptor());
+  auto client = ManagementClient::open(ptp4l_address(options()));
+  if (!client) return client.error();
+  client_.emplace(std::move(*client));
+  transport().watch(client_->descriptor());
   return std::nullopt;
 }
 
@@ -72,8 +58,8 @@ void MonitorReceiver::wait_until(FreeRunningTime underlying) {
 }
 
 void MonitorReceiver::housekeeping(FreeRunningTime now) {
-  ask_for_timescale(now);
-  ask_for_link_delay(now);
+  ask_ptp4l(now);
+  read_answers(now);
   read_reports();
   follower_.on_silence();
   if (real_clock() != nullptr) {
@@ -88,34 +74,46 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
 }
 
 // A real clock shows UTC or TAI, chrony UTC; ptp4l's reports do not say which the reference does.
-void MonitorReceiver::ask_for_timescale(FreeRunningTime now) {
-  constexpr Duration kInterval{std::chrono::seconds{30}};
-  if (!needs_scale() || now < next_question_) return;
-  const bool first = next_question_ == FreeRunningTime{};
-  next_question_ = now + kInterval;
-  const auto properties = ask_ptp4l<ptp::TimePropertiesDataSet>(
-      options(), ptp::ManagementId::kTimePropertiesDataSet, first ? kPatienceMs : kSoonMs);
-  if (properties) {
-    set_scale(reference_scale(properties->flags, properties->utc_offset));
-  } else if (first) {
+// Nor do they have its peer delay messages, but it tells what they came to.
+void MonitorReceiver::ask_ptp4l(FreeRunningTime now) {
+  constexpr Duration kInterval{std::chrono::seconds{1}};
+  constexpr Duration kScaleInterval{std::chrono::seconds{30}};
+  if (needs_scale() && now >= next_scale_question_) {
+    next_scale_question_ = now + (scale_known_ ? kScaleInterval : kInterval);
+    client_->ask(ptp::ManagementId::kTimePropertiesDataSet);
+  }
+  if (options().peer_to_peer() && source_.counters().syncs > 0 && now >= next_link_question_) {
+    next_link_question_ = now + kInterval;
+    client_->ask(ptp::ManagementId::kPortDataSet);
+  }
+  if (waits_for_scale_since_ && now - *waits_for_scale_since_ > kAnswerPatience) {
     fail("ptp4l does not answer on " + options().ptp4l_socket +
          " (--ptp4l-socket), and nothing else says whether its reference shows TAI or UTC");
   }
 }
 
-// ptp4l does not report its peer delay messages, but it tells what they came to.
-void MonitorReceiver::ask_for_link_delay(FreeRunningTime now) {
-  constexpr Duration kInterval{std::chrono::seconds{1}};
-  if (!options().peer_to_peer() || source_.counters().syncs == 0 || now < next_link_question_) {
-    return;
+void MonitorReceiver::read_answers(FreeRunningTime now) {
+  for (int i = 0; i < kAnswersAtOnce; ++i) {
+    const auto answer = client_->next_answer();
+    if (!answer) return;
+    if (const auto* properties = std::get_if<ptp::TimePropertiesDataSet>(&*answer)) {
+      scale_known_ = true;
+      waits_for_scale_since_.reset();
+      set_scale(reference_scale(properties->flags, properties->utc_offset));
+    } else if (const auto* port = std::get_if<ptp::PortDataSet>(&*answer)) {
+      on_port_data(*port, now);
+    }
   }
-  next_link_question_ = now + kInterval;
-  const auto port =
-      ask_ptp4l<ptp::PortDataSet>(options(), ptp::ManagementId::kPortDataSet, kSoonMs);
-  if (!port || port->mean_link_delay <= Duration{}) return;  // none yet
+}
+
+// A boundary clock answers for each of its ports: the one that receives time is meant.
+void MonitorReceiver::on_port_data(const ptp::PortDataSet& port, FreeRunningTime now) {
+  const bool receives =
+      port.state == ptp::PortState::kTimeReceiver || port.state == ptp::PortState::kUncalibrated;
+  if (!receives || port.mean_link_delay <= Duration{}) return;  // none yet
   const bool first = !std::exchange(link_delay_known_, true);
   const auto wrong =
-      follower_.on_link_delay(port->mean_link_delay, first, now, source_.sync_interval());
+      follower_.on_link_delay(port.mean_link_delay, first, now, source_.sync_interval());
   if (wrong) fail(*wrong);
 }
 
@@ -132,6 +130,10 @@ void MonitorReceiver::read_reports() {
 // ptp4l's stamps are readings of the clock that is steered here: its steps are none of the
 // reference.
 void MonitorReceiver::on_sample(const ptp::MonitorSample& sample) {
+  if (needs_scale() && !scale_known_) {
+    if (!waits_for_scale_since_) waits_for_scale_since_ = now();
+    return;
+  }
   const auto stamp = timestamps().convert({sample.local_ns, sample.local_ns});
   if (!stamp) return;  // the clock was set in between: counted there
   const auto before = source_.transmitter();
@@ -207,8 +209,13 @@ std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
 
 void complete_by_ptp4l(PtpOptions& options, Log& log) {
   using platform::TimestampMode;
-  const auto properties =
-      ask_ptp4l<ptp::PortPropertiesNp>(options, ptp::ManagementId::kPortPropertiesNp, kPatienceMs);
+  std::optional<ptp::PortPropertiesNp> properties;
+  std::optional<ptp::PortDataSet> port;
+  if (auto client = ManagementClient::open(ptp4l_address(options))) {
+    properties = client->ask_and_wait<ptp::PortPropertiesNp>(ptp::ManagementId::kPortPropertiesNp,
+                                                             kPatienceMs);
+    port = client->ask_and_wait<ptp::PortDataSet>(ptp::ManagementId::kPortDataSet, kPatienceMs);
+  }
   if (options.timestamps == TimestampMode::kBestAvailable) {
     const bool hardware = properties && properties->timestamping != 0;
     options.timestamps = hardware ? TimestampMode::kHardware : TimestampMode::kSoftware;
@@ -219,9 +226,6 @@ void complete_by_ptp4l(PtpOptions& options, Log& log) {
           options.ptp4l_socket);
     }
   }
-  const auto port =
-      ask_ptp4l<ptp::PortDataSet>(options, ptp::ManagementId::kPortDataSet, kPatienceMs);
-  constexpr std::uint8_t kPeerToPeer = 2;
   if (port && port->delay_mechanism == kPeerToPeer) {
     options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/management_client.h"
 #include "apps/ftcs/ptp_port.h"
 #include "ftcs/platform/local_socket.h"
 #include "ftcs/ptp/monitor_source.h"
@@ -47,8 +48,9 @@ class MonitorReceiver final : public PtpPort, private Managed {
   void act(const ptp::Action&) override {}
 
   void read_reports();
-  void ask_for_timescale(FreeRunningTime now);
-  void ask_for_link_delay(FreeRunningTime now);
+  void ask_ptp4l(FreeRunningTime now);
+  void read_answers(FreeRunningTime now);
+  void on_port_data(const ptp::PortDataSet& port, FreeRunningTime now);
   void on_sample(const ptp::MonitorSample& sample);
   void watch_for_silence(FreeRunningTime now);
   void log_lock();
@@ -59,7 +61,10 @@ class MonitorReceiver final : public PtpPort, private Managed {
   ptp::MonitorSource source_;
   ClockFollower follower_;
   FreeRunningTime last_report_{};
-  FreeRunningTime next_question_{};
+  std::optional<ManagementClient> client_{};
+  FreeRunningTime next_scale_question_{};
+  std::optional<FreeRunningTime> waits_for_scale_since_{};  ///< samples come and cannot be used
+  bool scale_known_ = false;
   FreeRunningTime next_link_question_{};
   bool link_delay_known_ = false;
   bool silent_ = false;          ///< said so

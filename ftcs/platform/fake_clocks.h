@@ -92,7 +92,7 @@ class FakeClocks final : public FakeKernel {
     const bool woken = timer_ns > 0 && static_cast<double>(timer_ns) <= timeout;
     run(woken ? static_cast<double>(timer_ns) : timeout);
     timer_ns = woken ? 0 : timer_ns - std::llround(timeout);
-    for (pollfd& entry : descriptors) entry.revents = woken ? POLLIN : 0;
+    for (pollfd& entry : descriptors) entry.revents = woken && entry.fd >= 0 ? POLLIN : 0;
     if (on_poll) on_poll();
     return woken ? 1 : 0;
   }

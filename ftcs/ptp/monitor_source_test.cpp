@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ftcs/ptp/fake_monitor.h"
 #include "test/support/forbid_allocation.h"
 
 namespace ftcs::ptp {
@@ -14,31 +15,7 @@ namespace {
 
 constexpr std::int64_t kStart = 1'795'299'184'000'000'000;
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-void append(std::vector<std::uint8_t>& bytes, std::uint64_t value, int octets) {
-  for (int i = octets; i-- > 0;) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-}
-void append_time(std::vector<std::uint8_t>& bytes, std::int64_t ns) {
-  append(bytes, static_cast<std::uint64_t>(ns / kSecond), 6);
-  append(bytes, static_cast<std::uint64_t>(ns % kSecond), 4);
-}
-
-/// A Sync that left at `origin` and came at `local`, or a Delay_Req.
-std::vector<std::uint8_t> report(bool sync, std::uint16_t sequence, std::int64_t reference,
-                                 std::int64_t local, std::uint8_t transmitter = 0xA) {
-  std::vector<std::uint8_t> bytes{0x0c, 0x02, 0, static_cast<std::uint8_t>(sync ? 92 : 88)};
-  bytes.resize(44);
-  append(bytes, sync ? 0x8004 : 0x7F00, 2);
-  append(bytes, sync ? 44 : 40, 2);
-  append(bytes, 0x020000FFFE000000U + transmitter, 8);
-  append(bytes, 1, 2);
-  append(bytes, sequence, 2);
-  append_time(bytes, sync ? reference : local);
-  append(bytes, 0, 8);
-  if (sync) append(bytes, 0, 4);
-  append_time(bytes, sync ? local : reference);
-  return bytes;
-}
+using fake::report;
 
 std::vector<std::uint8_t> sync(std::uint16_t sequence, std::int64_t ns,
                                std::uint8_t transmitter = 0xA) {

@@ -16,17 +16,16 @@ constexpr int kAnswersAtOnce = 16;
 }  // namespace
 
 Result<PortWatch, platform::OsError> PortWatch::open(const PortAddress& address) {
-  auto socket = platform::LocalSocket::client();
-  if (!socket) return socket.error();
-  return PortWatch(address, std::move(*socket));
+  auto client = ManagementClient::open(address);
+  if (!client) return client.error();
+  return PortWatch(std::move(*client));
 }
 
 void PortWatch::attend(std::int64_t now_ns) {
   for (int i = 0; i < kAnswersAtOnce; ++i) {
-    const auto datagram = socket_.receive();
-    if (!datagram) break;
-    const auto message = ptp::decode_management(datagram->bytes);
-    if (message && message->data) take(*message->data, now_ns);
+    const auto answer = client_.next_answer();
+    if (!answer) break;
+    take(*answer, now_ns);
   }
   if (port_ && now_ns - answered_ns_ > kPatienceNs) {
     port_.reset();
@@ -35,20 +34,8 @@ void PortWatch::attend(std::int64_t now_ns) {
   }
   if (asked_ns_ && now_ns - *asked_ns_ < kQuestionIntervalNs) return;
   asked_ns_ = now_ns;
-  ask(ptp::ManagementId::kPortPropertiesNp);
-  ask(ptp::ManagementId::kTimePropertiesDataSet);
-}
-
-// To all ports, as pmc -b 0 asks. Nobody there is no error: it may come.
-void PortWatch::ask(ptp::ManagementId id) {
-  ptp::ManagementMessage question;
-  question.header.domain = address_.domain;
-  question.header.major_sdo_id = address_.major_sdo_id;
-  question.header.minor_version = 0;  // every version of linuxptp takes it
-  question.body.target.clock.octets.fill(0xFF);
-  question.body.target.port = 0xFFFF;
-  question.id = id;
-  (void)socket_.send(address_.socket, ptp::encode_management(question).view());
+  client_.ask(ptp::ManagementId::kPortPropertiesNp);
+  client_.ask(ptp::ManagementId::kTimePropertiesDataSet);
 }
 
 // A boundary clock answers for each of its ports: the one that receives time is the one that

@@ -5,21 +5,13 @@
 #include <optional>
 #include <string>
 
+#include "apps/ftcs/management_client.h"
 #include "apps/ftcs/real_clock.h"
-#include "ftcs/platform/local_socket.h"
 #include "ftcs/platform/os_error.h"
 #include "ftcs/ptp/port_state.h"
-#include "ftcs/ptp/wire/management.h"
 #include "ftcs/time/result.h"
 
 namespace ftcs::app {
-
-/// Where a PTP program of this machine is asked, and in which domain.
-struct PortAddress {
-  std::string socket = "/var/run/ptp4l";
-  std::uint8_t domain = 0;
-  std::uint8_t major_sdo_id = 0;
-};
 
 /// What a PTP program of this machine (ptp4l, ftcs ptp) says about its port over its management
 /// socket: asked once a second, never waited for.
@@ -48,14 +40,11 @@ class PortWatch {
   }
 
  private:
-  PortWatch(PortAddress address, platform::LocalSocket socket)
-      : address_(std::move(address)), socket_(std::move(socket)) {}
+  explicit PortWatch(ManagementClient client) : client_(std::move(client)) {}
 
-  void ask(ptp::ManagementId id);
   void take(const ptp::ManagementData& data, std::int64_t now_ns);
 
-  PortAddress address_;
-  platform::LocalSocket socket_;
+  ManagementClient client_;
   std::optional<Port> port_;
   std::optional<ptp::PortPropertiesNp> properties_;
   std::optional<ReferenceScale> scale_;

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "ftcs/platform/local_socket.h"
+#include "ftcs/platform/os_error.h"
+#include "ftcs/ptp/wire/management.h"
+#include "ftcs/time/result.h"
+
+namespace ftcs::app {
+
+/// Where a PTP program of this machine is asked, and in which domain.
+struct PortAddress {
+  std::string socket = "/var/run/ptp4l";
+  std::uint8_t domain = 0;
+  std::uint8_t major_sdo_id = 0;
+};
+
+/// Asks a PTP program of this machine (ptp4l, ftcs ptp) over its management socket, as pmc does.
+/// Questions and answers are datagrams: nothing is waited for, and who asks takes what has come.
+class ManagementClient {
+ public:
+  [[nodiscard]] static Result<ManagementClient, platform::OsError> open(const PortAddress& address);
+
+  /// To all ports. Nobody there is no error: it may come.
+  void ask(ptp::ManagementId id);
+  /// The next answer that can be understood; no value: none has come.
+  [[nodiscard]] std::optional<ptp::ManagementData> next_answer();
+  /// Asks, and waits for that one answer: for where nothing runs yet.
+  template <class Data>
+  [[nodiscard]] std::optional<Data> ask_and_wait(ptp::ManagementId id, int patience_ms) {
+    ask(id);
+    socket_.wait(patience_ms);
+    while (const auto answer = next_answer()) {
+      if (const auto* data = std::get_if<Data>(&*answer)) return *data;
+    }
+    return std::nullopt;
+  }
+  /// Readable when an answer has come.
+  [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
+
+ private:
+  ManagementClient(PortAddress address, platform::LocalSocket socket)
+      : address_(std::move(address)), socket_(std::move(socket)) {}
+
+  PortAddress address_;
+  platform::LocalSocket socket_;
+};
+
+}  // namespace ftcs::app
