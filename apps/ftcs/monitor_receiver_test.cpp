@@ -13,7 +13,7 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/ptp_clock.h"
 #include "ftcs/platform/fake_clocks.h"
-#include "ftcs/ptp/fake_monitor.h"
+#include "ftcs/ptp/monitor_fixture.h"
 
 namespace ftcs::app {
 namespace {

@@ -54,11 +54,19 @@ ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::
   port.port.announce_receipt_timeout = options.announce_receipt_timeout;
   port.port.log_sync_interval = options.log_sync_interval;
   port.port.log_min_delay_req_interval = options.log_min_delay_req_interval;
+  port.port.log_min_pdelay_req_interval = options.peer_delay.log_min_interval;
+  if (options.peer_to_peer()) port.port.delay_mechanism = kPeerToPeer;
   port.port.version = static_cast<std::uint8_t>(options.minor_version << 4 | ptp::kVersion);
   port.properties = {facts.identity, state, static_cast<std::uint8_t>(facts.hardware_stamps),
                      ptp::PtpText<32>(options.interface)};
   port.stats.port = facts.identity;
   return port;
+}
+
+void set_peer_delay(const ptp::PeerDelay& peer_delay, ptp::ManagedPort& port) {
+  if (port.port.delay_mechanism != kPeerToPeer) return;
+  port.port.mean_link_delay = peer_delay.mean_link_delay().value_or(Duration{});
+  port.port_np.as_capable = peer_delay.capable() ? 1 : 0;
 }
 
 ptp::ManagedPort receiver(const PtpOptions& options, const PortFacts& facts, ptp::PortState state) {
@@ -131,11 +139,7 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
   // would use itself.
   port.port.log_min_delay_req_interval =
       static_cast<std::int8_t>(std::lround(std::log2(core.delay_request_interval().seconds())));
-  if (core.delay_mechanism() == ptp::DelayMechanism::kPeerToPeer) {
-    port.port.delay_mechanism = kPeerToPeer;
-    port.port.mean_link_delay = core.peer_delay().mean_link_delay().value_or(Duration{});
-    port.port_np.as_capable = core.peer_delay().capable() ? 1 : 0;
-  }
+  set_peer_delay(core.peer_delay(), port);
   if (const auto* transmitter = core.transmitter()) {
     set_transmitter(*transmitter, port);
     set_sample(follower.status(now), port);
@@ -155,12 +159,14 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts, pt
   port.time_status.grandmaster_present = 1;
   port.time_status.grandmaster = transmitter->clock;
   set_sample(follower.status(now), port);
+  if (options.peer_to_peer()) port.port.mean_link_delay = port.current.mean_path_delay;
   return port;
 }
 
 ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
                            const ptp::TimeTransmitter& core) {
   ptp::ManagedPort port = common(options, facts, core.state());
+  set_peer_delay(core.peer_delay(), port);
   port.stats = statistics(facts.identity, core.counters());
   return port;
 }

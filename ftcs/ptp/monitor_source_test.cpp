@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/fake_monitor.h"
+#include "ftcs/ptp/monitor_fixture.h"
 #include "test/support/forbid_allocation.h"
 
 namespace ftcs::ptp {

@@ -61,4 +61,24 @@ code=0
 status > "$folder/status.log" 2>&1 || code=$?
 [ "$code" -eq 1 ] || fail "ftcs status without an instance: exit code $code, expected 1"
 [ "$(wc -l < "$folder/status.log")" -eq 1 ] || fail "more or less than one line of error"
+# Peer to peer, our transmitter and ptp4l's receiver in a domain of their own: PORT_DATA_SET says what is in use.
+ip netns exec "$ours" "$ftcs" ptp -i "$our_interface" --role time-transmitter -S -P --domainNumber 5 \
+  --logMinPdelayReqInterval -2 --tx_timestamp_timeout 50 --uds_address "$folder/ftcs.uds" > "$folder/p2p.log" 2>&1 &
+transmitter=$!
+pids+=("$transmitter")
+start_ptp4l p2p_receiver "slaveOnly 1" "delay_mechanism P2P" "domainNumber 5" "logMinPdelayReqInterval -2"
+port() { pmc -u -d 5 -b 0 -s "$1" -i "$folder/pmc.uds" "GET PORT_DATA_SET" 2> /dev/null | sed -n "s/^\t\t$2 *//p"; }
+for _ in $(seq 75); do
+  delay=$(port "$folder/ftcs.uds" peerMeanPathDelay)
+  [ "${delay:-0}" != 0 ] && break
+  sleep 0.2
+done
+port "$folder/ftcs.uds" peerMeanPathDelay | grep -qE '^[1-9][0-9]{2,5}$' || fail "peerMeanPathDelay is '$delay' ns"
+[ "$(port "$folder/p2p_receiver.uds" delayMechanism)" = 2 ] || fail "ptp4l does not measure peer to peer"
+for field in delayMechanism logMinPdelayReqInterval; do
+  mine=$(port "$folder/ftcs.uds" "$field") wanted=$(port "$folder/p2p_receiver.uds" "$field")
+  [ "$mine" = "$wanted" ] || fail "PORT_DATA_SET of a peer-to-peer transmitter: $field '$mine', ptp4l has '$wanted'"
+done
+kill -INT "$transmitter"
+wait "$transmitter" || fail "the transmitter's exit code is $?"
 echo "pmc reads our data sets, ftcs status agrees, a second instance is refused"
