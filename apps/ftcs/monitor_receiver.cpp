@@ -5,6 +5,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/status_report.h"
+#include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {
 namespace {
@@ -207,8 +208,9 @@ std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
   return monitor_status(port, source_, state(), follower_, now());
 }
 
-void complete_by_ptp4l(PtpOptions& options, Log& log) {
+bool complete_by_ptp4l(PtpOptions& options, Log& log) {
   using platform::TimestampMode;
+  const platform::StopFlag stop;  // the client's folder goes, whatever ends the wait
   std::optional<ptp::PortPropertiesNp> properties;
   std::optional<ptp::PortDataSet> port;
   if (auto client = ManagementClient::open(ptp4l_address(options))) {
@@ -229,10 +231,11 @@ void complete_by_ptp4l(PtpOptions& options, Log& log) {
   if (port && port->delay_mechanism == kPeerToPeer) {
     options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   }
-  if (!options.interface.empty()) return;
+  if (!options.interface.empty()) return !stop.is_set();
   const bool hardware = options.timestamps == TimestampMode::kHardware;
   // Software timestamps are CLOCK_REALTIME on every interface; this one is always there.
   options.interface = hardware && properties ? std::string(properties->interface.view()) : "lo";
+  return !stop.is_set();
 }
 
 }  // namespace ftcs::app

@@ -73,7 +73,8 @@ class MonitorReceiver final : public PtpPort, private Managed {
 };
 
 /// Asks ptp4l, where it can be reached, which clock its timestamps are readings of and how it
-/// measures the delay, and completes the options by that where the user did not say.
-void complete_by_ptp4l(PtpOptions& options, Log& log);
+/// measures the delay, and completes the options by that where the user did not say. False: a
+/// signal ended it.
+[[nodiscard]] bool complete_by_ptp4l(PtpOptions& options, Log& log);
 
 }  // namespace ftcs::app

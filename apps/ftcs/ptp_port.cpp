@@ -255,7 +255,7 @@ Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& ker
 int run_ptp(platform::Kernel& kernel, const PtpOptions& given) {
   PtpOptions options = given;
   Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
-  if (options.source == Source::kPtp4l) complete_by_ptp4l(options, log);
+  if (options.source == Source::kPtp4l && !complete_by_ptp4l(options, log)) return kNotLocked;
   auto clocks = open_ptp_clocks(kernel, options, log);
   if (!clocks) {
     log(LogLevel::kError, "{}", clocks.error());

@@ -9,6 +9,7 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/management_server.h"
 #include "apps/ftcs/status_report.h"
+#include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {
 namespace {
@@ -45,21 +46,23 @@ Result<Answer, std::string> ask(const std::string& path) {
 }
 
 /// The first of the usual places where somebody answers.
-Result<Answer, std::string> ask_somebody(const std::string& given) {
+Result<Answer, std::string> ask_somebody(const std::string& given, const platform::StopFlag& stop) {
   if (!given.empty()) return ask(given);
   std::string tried;
   for (const std::string& path : platform::usual_socket_paths(kSocketName)) {
     auto answer = ask(path);
     if (answer) return answer;
+    if (stop.is_set()) break;
     tried += fmt::format("{}{}", tried.empty() ? "" : "; ", answer.error());
   }
   return fmt::format("no running instance found ({}); -s names its socket", tried);
 }
 
 int run(const StatusArguments& arguments) {
-  const auto answer = ask_somebody(arguments.socket);
+  const platform::StopFlag stop;  // our socket's folder goes, whatever ends the wait
+  const auto answer = ask_somebody(arguments.socket, stop);
   if (!answer) {
-    fmt::print(stderr, "ftcs status: {}\n", answer.error());
+    if (!stop.is_set()) fmt::print(stderr, "ftcs status: {}\n", answer.error());
     return kRuntimeError;
   }
   fmt::print("{}", arguments.json ? answer->json : answer->for_people.text);

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -16,6 +17,7 @@ namespace ftcs::platform {
 namespace {
 
 constexpr mode_t kMode = 0660;
+constexpr mode_t kFolderMode = 0710;             // of a client whose server's group may answer
 constexpr std::size_t kLongestDatagram = 65536;  // longer ones are cut, and so not understood
 
 std::optional<sockaddr_un> address_of(const std::string& path) {
@@ -60,13 +62,35 @@ ino_t inode_of(const std::string& path) {
   return ::lstat(path.c_str(), &file) == 0 ? file.st_ino : 0;
 }
 
+/// bind(2) with the mode that the file is to have: there is no moment in which others may write.
+/// 0 or -errno.
+int bind_with_mode(int fd, const sockaddr_un& address) {
+  const mode_t usual = ::umask(~kMode & 0777U);  // one thread
+  const int result = ::bind(fd, generic(address), sizeof address) == 0 ? 0 : -errno;
+  ::umask(usual);
+  return result;
+}
+
+/// Puts a socket in the place of one that nobody serves. Two programs that find the same left-over
+/// must not remove each other's new socket: the folder is held meanwhile. 0 or -errno.
+int replace_abandoned(int fd, const sockaddr_un& address) {
+  const std::string path = address.sun_path;
+  const std::size_t slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const int hold = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (hold < 0) return -errno;
+  int result = -EADDRINUSE;
+  if (::flock(hold, LOCK_EX | LOCK_NB) == 0 && is_abandoned(address)) {
+    result = ::unlink(address.sun_path) == 0 ? bind_with_mode(fd, address) : -errno;
+  }
+  ::close(hold);
+  return result;
+}
+
 /// 0 or -errno.
 int bind_to(int fd, const sockaddr_un& address) {
-  if (::bind(fd, generic(address), sizeof address) == 0) return 0;
-  if (errno != EADDRINUSE) return -errno;
-  if (!is_abandoned(address)) return -EADDRINUSE;
-  if (::unlink(address.sun_path) != 0) return -errno;
-  return ::bind(fd, generic(address), sizeof address) == 0 ? 0 : -errno;
+  const int result = bind_with_mode(fd, address);
+  return result == -EADDRINUSE ? replace_abandoned(fd, address) : result;
 }
 
 }  // namespace
@@ -87,9 +111,7 @@ Result<LocalSocket, OsError> LocalSocket::bind(const std::string& path) {
     ::close(fd);
     return path_error(-result, path);
   }
-  LocalSocket socket(fd, path, "");
-  if (::chmod(path.c_str(), kMode) != 0) return path_error(errno, path);
-  return socket;
+  return LocalSocket(fd, path, "");
 }
 
 Result<LocalSocket, OsError> LocalSocket::client() {
@@ -114,7 +136,8 @@ LocalSocket::LocalSocket(LocalSocket&& other) noexcept
       buffer_(std::move(other.buffer_)),
       path_(std::move(other.path_)),
       folder_(std::move(other.folder_)),
-      inode_(other.inode_) {}
+      inode_(other.inode_),
+      answerers_(other.answerers_) {}
 
 LocalSocket& LocalSocket::operator=(LocalSocket&& other) noexcept {
   if (this != &other) {
@@ -124,6 +147,7 @@ LocalSocket& LocalSocket::operator=(LocalSocket&& other) noexcept {
     path_ = std::move(other.path_);
     folder_ = std::move(other.folder_);
     inode_ = other.inode_;
+    answerers_ = other.answerers_;
   }
   return *this;
 }
@@ -157,10 +181,22 @@ void LocalSocket::wait(int milliseconds) const {
   (void)::poll(&entry, 1, milliseconds);
 }
 
+// As we may write to a server's socket by its group, so its group may write to ours. Where the
+// group is not ours to give, the server must be root or of our own user.
+void LocalSocket::let_answer(const std::string& server) {
+  struct stat file {};
+  if (::stat(server.c_str(), &file) != 0 || answerers_ == file.st_gid) return;
+  const auto same_user = static_cast<uid_t>(-1);
+  if (::chown(path_.c_str(), same_user, file.st_gid) != 0) return;
+  if (::chown(folder_.c_str(), same_user, file.st_gid) != 0) return;
+  if (::chmod(folder_.c_str(), kFolderMode) == 0) answerers_ = file.st_gid;
+}
+
 std::optional<OsError> LocalSocket::send(const std::string& path,
                                          std::span<const std::uint8_t> bytes) {
   const auto address = address_of(path);
   if (!address) return path_error(ENAMETOOLONG, path);
+  if (!folder_.empty()) let_answer(path);
   const ssize_t sent =
       ::sendto(fd_, bytes.data(), bytes.size(), 0, generic(*address), sizeof *address);
   if (sent >= 0) return std::nullopt;

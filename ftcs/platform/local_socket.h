@@ -21,7 +21,8 @@ class LocalSocket {
   /// kAddressInUse, and so is a file that is no socket. Owner and group may write to it.
   [[nodiscard]] static Result<LocalSocket, OsError> bind(const std::string& path);
   /// Bound to a file of its own in a new folder under $TMPDIR or /tmp, so that it can be answered
-  /// from another network namespace too.
+  /// from another network namespace too: by root, by our own user, and, once something was sent to
+  /// it, by the group of a server's socket.
   [[nodiscard]] static Result<LocalSocket, OsError> client();
 
   LocalSocket(LocalSocket&& other) noexcept;
@@ -46,13 +47,15 @@ class LocalSocket {
 
  private:
   LocalSocket(int fd, std::string path, std::string folder);
+  void let_answer(const std::string& server);
   void close() noexcept;
 
   int fd_ = -1;
   std::vector<std::uint8_t> buffer_;
   std::string path_{};
-  std::string folder_{};  ///< of a client: removed too
-  ino_t inode_ = 0;       ///< somebody may have put another file in our place
+  std::string folder_{};              ///< of a client: removed too
+  ino_t inode_ = 0;                   ///< somebody may have put another file in our place
+  std::optional<gid_t> answerers_{};  ///< the group that may write to a client
 };
 
 /// Where a program's socket is looked for, in this order: /var/run, $XDG_RUNTIME_DIR.

@@ -4,11 +4,15 @@
 #include "ftcs/platform/local_socket.h"
 
 #include <cstdlib>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <grp.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -127,6 +131,63 @@ TEST_F(LocalSockets, OthersMayNotWrite) {
   struct stat status {};
   ASSERT_EQ(::stat(file("server").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777U, 0660U);
+}
+
+TEST_F(LocalSockets, OthersMayNotWriteEvenWithoutAnyUmask) {
+  const mode_t usual = ::umask(0);
+  const auto server = LocalSocket::bind(file("server"));
+  EXPECT_EQ(::umask(usual), 0U) << "it is put back";
+  struct stat status {};
+  ASSERT_EQ(::stat(file("server").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0660U);
+}
+
+TEST_F(LocalSockets, ALeftOverThatAnotherProgramIsReplacingIsLeftToIt) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  file("server").copy(address.sun_path, sizeof address.sun_path - 1);
+  const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ::close(dead);
+  const int other = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(::flock(other, LOCK_EX), 0);
+  EXPECT_EQ(LocalSocket::bind(file("server")).error().kind, OsErrorKind::kAddressInUse);
+  ::close(other);
+  EXPECT_TRUE(LocalSocket::bind(file("server")).ok());
+}
+
+TEST_F(LocalSockets, AServerOfAnotherUserAnswersByItsGroup) {
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root to be another user";
+  constexpr gid_t kSomebody = 54321;
+  std::filesystem::permissions(folder, std::filesystem::perms::all);
+  auto client = LocalSocket::client();
+  ASSERT_TRUE(client.ok());
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    bool good =
+        ::setgroups(0, nullptr) == 0 && ::setgid(kSomebody) == 0 && ::setuid(kSomebody) == 0;
+    auto server = LocalSocket::bind(file("server"));
+    good = good && server.ok() && ::write(ready[1], "x", 1) == 1;
+    if (good) server->wait(2000);
+    const auto question = good ? server->receive() : std::nullopt;
+    good = question && !server->send(question->sender, octets("answer"));
+    ::_exit(good ? 0 : 1);
+  }
+  char started = 0;
+  ASSERT_EQ(::read(ready[0], &started, 1), 1);
+  EXPECT_FALSE(client->send(file("server"), octets("question")).has_value());
+  int status = 1;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0) << "it could not answer";
+  client->wait(1000);
+  const auto answer = client->receive();
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(text(*answer), "answer");
+  struct stat seen {};
+  ASSERT_EQ(::stat(std::filesystem::path(client->path()).parent_path().c_str(), &seen), 0);
+  EXPECT_EQ(seen.st_mode & 0777U, 0710U) << "and nobody else";
 }
 
 TEST_F(LocalSockets, AFullQueueDoesNotBlock) {

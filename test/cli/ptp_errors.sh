@@ -93,6 +93,22 @@ expect 2 "--ntp-shm: '256': expected an integer" ptp -i lo --ntp-shm 256
 expect 2 "follows nobody" ptp -i lo --role time-transmitter --chrony-sock "$folder/chrony"
 expect 2 "two programs would steer" ptp -i lo --clock system --chrony-sock "$folder/chrony"
 
+# Ctrl-C while somebody who never answers is asked: nothing is left behind.
+mkdir "$folder/tmp"
+python3 -c 'import socket, sys, time
+s = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM); s.bind(sys.argv[1]); time.sleep(20)' "$folder/deaf" &
+holder=$!
+for _ in $(seq 50); do [ -S "$folder/deaf" ] && break; sleep 0.1; done
+for command in "status -s $folder/deaf" "ptp --source ptp4l --ptp4l-socket $folder/deaf --slave_event_monitor $folder/monitor"; do
+  # shellcheck disable=SC2086
+  TMPDIR=$folder/tmp timeout --foreground -s INT 0.4 "$ftcs" $command > "$folder/out" 2> "$folder/err"
+  if [ -n "$(ls "$folder/tmp")" ] || [ -s "$folder/err" ]; then
+    echo "FAILED: ftcs $command, ended by Ctrl-C, left $(ls "$folder/tmp") and said: $(cat "$folder/err")"
+    failures=$((failures + 1))
+  fi
+done
+kill "$holder"
+
 # A port that another program holds: a unicast port belongs to one.
 ports=(--event-port $((20000 + $$ % 10000)) --general-port $((30000 + $$ % 10000)))
 "$ftcs" ptp -i lo "${ports[@]}" --unicast 127.0.0.1 > /dev/null 2>&1 &
