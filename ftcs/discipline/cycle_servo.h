@@ -50,6 +50,8 @@ class BasicCycleServo {
   void count(CycleVerdict verdict) noexcept;
   void anchor(const CycleSample& sample, FreeRunningTime stamp) noexcept;
   void follow(const CycleSample& sample, FreeRunningTime stamp, FreeRunningTime now) noexcept;
+  [[nodiscard]] bool doubtful(Duration error) noexcept;
+  [[nodiscard]] bool sample_due() const noexcept;
   [[nodiscard]] ServoUpdate ask_law(const CycleSample& sample, FreeRunningTime stamp,
                                     const ClockReading& now) noexcept;
   void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
@@ -66,6 +68,7 @@ class BasicCycleServo {
   SteeringHistory history_;
   CycleTimer timer_;
   LockDetector lock_;
+  OutlierGate gate_;        ///< of the phase error: the steered clock predicts that there is none
   CycleTrigger trigger_{};  ///< of the cycle under way
   CycleDecision decision_{};
   CycleServoCounters counters_{};

@@ -2,6 +2,7 @@
 # are compiled once more, so that no other archive has to be linked.
 set(ftcs_cycle_sources ftcs_cycle_servo.cpp
   ${PROJECT_SOURCE_DIR}/ftcs/clock/cycle_timer.cpp
+  ${PROJECT_SOURCE_DIR}/ftcs/measurement/outlier_gate.cpp
   ${PROJECT_SOURCE_DIR}/ftcs/servo/ftcs_servo.cpp
   ${PROJECT_SOURCE_DIR}/ftcs/servo/pics_servo.cpp)
 function(ftcs_cycle_library name)

@@ -57,7 +57,8 @@ BasicCycleServo<Adaptive>::BasicCycleServo(const CycleServoConfig& config) noexc
       adaptive_(cycle_servo_detail::adaptive_config(config)),
       history_(SteeringHistory::Map{}),
       timer_({.first = LocalTime{}, .cycle_time = config.cycle, .resolution = config.resolution}),
-      lock_(config.lock) {}
+      lock_(config.lock),
+      gate_(config.outliers) {}
 
 template <class Adaptive>
 CycleDecision BasicCycleServo<Adaptive>::start(FreeRunningTime now) noexcept {
@@ -79,6 +80,7 @@ void BasicCycleServo<Adaptive>::restart_law() noexcept {
   commands_ = 0;
   until_sync_ = 0;
   out_of_phase_ = 0;
+  gate_.reset();
 }
 
 /// In phase by the start's jump alone is no lock: the first interval still drifts away from it.
@@ -130,6 +132,9 @@ void BasicCycleServo<Adaptive>::count(CycleVerdict verdict) noexcept {
       break;
     case CycleVerdict::kImpossible:
       ++counters_.impossible;
+      break;
+    case CycleVerdict::kDoubtful:
+      ++counters_.doubtful;
       break;
   }
 }
@@ -196,9 +201,32 @@ void BasicCycleServo<Adaptive>::follow(const CycleSample& sample, FreeRunningTim
     return;
   }
   decision_.phase_error = error;
-  if (rate_known()) lock_.update(error);
+  const bool doubted = doubtful(error);
+  if (doubted) decision_.verdict = CycleVerdict::kDoubtful;
+  if (rate_known() && !doubted) lock_.update(error);
+  // The adaptive servo weighs each sample itself.
+  if (doubted && config_.law != CycleLaw::kAdaptive) return;
   const ServoUpdate update = ask_law(sample, stamp, {now, history_.local_at(now)});
   if (update.has_command) apply(update.command, now);
+}
+
+/// A decision costs two medians: it is made only where something hangs on this one phase. The
+/// paper's servo takes every sample.
+template <class Adaptive>
+bool BasicCycleServo<Adaptive>::doubtful(Duration error) noexcept {
+  if (config_.trigger == TriggerModel::kIdeal) return false;
+  if (!sample_due() && abs(error) < config_.lock.band.leave) {
+    gate_.observe(error);
+    return false;
+  }
+  return gate_.decide(error) == GateDecision::kReject;
+}
+
+/// FTCS and PICS act on this cycle, if it has a good sample.
+template <class Adaptive>
+bool BasicCycleServo<Adaptive>::sample_due() const noexcept {
+  const bool samples = config_.law == CycleLaw::kFtcs || config_.law == CycleLaw::kPics;
+  return samples && until_sync_ == 0;
 }
 
 template <class Adaptive>
@@ -210,7 +238,7 @@ ServoUpdate BasicCycleServo<Adaptive>::ask_law(const CycleSample& sample, FreeRu
   if (config_.law == CycleLaw::kAdaptive) {
     return adaptive_.update({Direction::kBackward, reference, local, stamp}, now);
   }
-  if (until_sync_ > 0) return {};
+  if (!sample_due()) return {};
   until_sync_ = config_.cycles_per_sync;
   const SyncSample sync{reference, Duration{}, local, stamp};
   return config_.law == CycleLaw::kFtcs ? ftcs_.update(sync, now) : pics_.update(sync, now);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "ftcs/discipline/lock_detector.h"
+#include "ftcs/measurement/outlier_gate.h"
 #include "ftcs/servo/adaptive/adaptive_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/pics_servo.h"
@@ -46,6 +47,10 @@ struct CycleServoConfig {
   /// Gates: a cycle that was later, or a frame that took longer, is coasted over. Zero: no gate.
   Nanoseconds largest_lateness{200'000};
   Nanoseconds largest_round_trip{200'000};
+  /// One stamp of a busy host in two hundred is ten or forty microseconds off, with a round trip
+  /// like the others'. Where it would be half of a k(n), or break a lock, the next cycle is asked;
+  /// five in a row are the truth.
+  OutlierGateConfig outliers{};
   LockConfig lock{{Nanoseconds{5'000}, Nanoseconds{20'000}}, 20};
   /// Cycles without a usable sample before a lock is called lost.
   std::uint32_t coast_limit = 2000;
@@ -76,11 +81,12 @@ enum class CycleState : std::uint8_t {
 };
 
 enum class CycleVerdict : std::uint8_t {
-  kUsed,       ///< phase known
-  kLost,       ///< no reference time
-  kLate,       ///< gated by the lateness of the sender
-  kSlow,       ///< gated by the round trip
-  kImpossible  ///< the reference jumped or went backward
+  kUsed,        ///< phase known
+  kLost,        ///< no reference time
+  kLate,        ///< gated by the lateness of the sender
+  kSlow,        ///< gated by the round trip
+  kImpossible,  ///< the reference jumped or went backward
+  kDoubtful,    ///< phase known, but alone among its neighbours: no law and no lock hears it
 };
 
 /// What comes of a cycle.
@@ -104,6 +110,7 @@ struct CycleServoCounters {
   std::uint64_t late = 0;
   std::uint64_t slow = 0;
   std::uint64_t impossible = 0;
+  std::uint64_t doubtful = 0;
   std::uint64_t skipped = 0;
   std::uint64_t resyncs = 0;  ///< the phase had to be found anew
 };

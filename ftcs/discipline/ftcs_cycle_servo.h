@@ -42,10 +42,12 @@ enum ftcs_cycle_state {
 
 enum ftcs_cycle_verdict {
   FTCS_CYCLE_USED = 0,
-  FTCS_CYCLE_LOST = 1,      /* has_reference was zero */
-  FTCS_CYCLE_LATE = 2,      /* sent later than largest_lateness_ns after the wake-up asked for */
-  FTCS_CYCLE_SLOW = 3,      /* under way longer than largest_round_trip_ns */
-  FTCS_CYCLE_IMPOSSIBLE = 4 /* the reference jumped */
+  FTCS_CYCLE_LOST = 1,       /* has_reference was zero */
+  FTCS_CYCLE_LATE = 2,       /* sent later than largest_lateness_ns after the wake-up asked for */
+  FTCS_CYCLE_SLOW = 3,       /* under way longer than largest_round_trip_ns */
+  FTCS_CYCLE_IMPOSSIBLE = 4, /* the reference jumped */
+  FTCS_CYCLE_DOUBTFUL = 5    /* a phase unlike its neighbours': asked again in the next cycle, the
+                                fifth in a row is believed */
 };
 
 enum ftcs_cycle_error {
@@ -105,7 +107,7 @@ typedef struct ftcs_cycle_decision {
 } ftcs_cycle_decision;
 
 #ifdef FTCS_CYCLE_WITHOUT_ADAPTIVE
-#define FTCS_CYCLE_WORDS 256
+#define FTCS_CYCLE_WORDS 288
 #else
 #define FTCS_CYCLE_WORDS 1664
 #endif

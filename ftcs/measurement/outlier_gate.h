@@ -46,6 +46,12 @@ class OutlierGate {
   /// Decides on one innovation and learns from it.
   [[nodiscard]] GateDecision decide(Duration innovation) noexcept;
 
+  /// Learns from an innovation on which nothing hangs; it ends a row of rejections.
+  void observe(Duration innovation) noexcept {
+    rejected_in_a_row_ = 0;
+    learn(innovation.ns());
+  }
+
   [[nodiscard]] bool warm() const noexcept { return size_ >= config_.warm_up; }
   /// Learnt standard deviation in nanoseconds; the resolution until something was learnt.
   [[nodiscard]] double spread_ns() const noexcept;

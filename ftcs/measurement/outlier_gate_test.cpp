@@ -47,6 +47,21 @@ TEST(OutlierGate, first_innovation_after_the_warm_up_can_be_rejected) {
   EXPECT_EQ(decide(gate, 1e6), GateDecision::kReject);
 }
 
+TEST(OutlierGate, learns_from_what_it_is_only_shown) {
+  OutlierGate gate;
+  const auto show_eight = [&gate] {
+    for (int i = 0; i < 8; ++i) gate.observe(Duration::from_ns(i % 2 == 0 ? 100.0 : -100.0));
+  };
+  show_eight();
+  EXPECT_TRUE(gate.warm());
+  EXPECT_EQ(decide(gate, 50.0), GateDecision::kAccept);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(decide(gate, 50'000.0), GateDecision::kReject) << "single outliers make no row";
+    show_eight();
+  }
+  EXPECT_EQ(gate.counters().accepted, 1U) << "what is shown is not decided on";
+}
+
 TEST(OutlierGate, learns_the_spread) {
   OutlierGate gate;
   Noise noise(1);

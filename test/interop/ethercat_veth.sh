@@ -41,15 +41,20 @@ run adaptive 8 || echo "adaptive: exit code $?"
 run pics 8 || echo "pics: exit code $?"
 run soem-pi 8 || echo "soem-pi did not lock (band 5 us)"
 
-python3 - "$folder" << 'PY'
+python3 - "$folder" "$seconds" << 'PY'
 import json, sys
 
-folder = sys.argv[1]
+folder, seconds = sys.argv[1], float(sys.argv[2])
 busy = False
 failed = []
 for servo, lock in (("ftcs", 3 * 500), ("adaptive", 50), ("pics", None), ("soem-pi", None)):
     run = json.load(open(f"{folder}/{servo}.json"))
     phase, wire = run["virtual_phase"], run["wire_phase"]
+    if "failure" in run and lock:
+        failed.append(f"{servo}: {run['failure']}")
+    # Late wake-ups and the time from the last cycle to the end cost a few.
+    if servo == "ftcs" and run["cycles"] + run["host_stall_cycles"] < 0.99 * 1000 * seconds:
+        failed.append(f"{servo}: only {run['cycles']} cycles")
     if phase is None:
         phase, wire = run["virtual_phase_second_half"], run["wire_phase_second_half"]
         print(f"{servo}: no lock (20 cycles within 5 us), rate {run['rate_ppb'] / 1000:.1f} ppm, second half |phase| p50 "

@@ -62,7 +62,7 @@ MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
   if (csv_) {
     fmt::print(csv_.get(),
                "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,"
-               "working_counter,margin_ns\n");
+               "working_counter,margin_ns,skipped\n");
   }
 }
 
@@ -270,21 +270,13 @@ void MainRunner::record(RunEvent::Kind kind, std::size_t drive, ethercat::AlStat
 }
 
 void MainRunner::watch_lock() {
-  const bool locked = decision_.state == CycleState::kLocked;
+  using Change = LockWatch::Change;
+  const Change change = figures_.lock.update(decision_.state == CycleState::kLocked);
+  if (change == Change::kLocked) record(RunEvent::Kind::kLocked);
+  if (change == Change::kLost) record(RunEvent::Kind::kLockLost);
   const bool followed = options_.servo.law != CycleLaw::kNone;
-  if (followed && lost_lock_at_ != 0 && !locked &&
-      figures_.cycles - lost_lock_at_ >= unlocked_limit_) {
+  if (followed && figures_.lock.without() >= unlocked_limit_) {
     main_->stop(ethercat::FailureKind::kSyncLost);
-  }
-  if (locked == was_locked_) return;
-  was_locked_ = locked;
-  record(locked ? RunEvent::Kind::kLocked : RunEvent::Kind::kLockLost);
-  if (!locked) {
-    ++figures_.lock_losses;
-    lost_lock_at_ = figures_.cycles;
-  } else if (lost_lock_at_ != 0) {
-    figures_.longest_relock = std::max(figures_.longest_relock,
-                                       static_cast<std::int64_t>(figures_.cycles - lost_lock_at_));
   }
 }
 
@@ -352,11 +344,11 @@ void MainRunner::print_live() const {
 }
 
 void MainRunner::write_csv(const CycleSample& sample) {
-  fmt::print(csv_.get(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{}\n", figures_.cycles,
+  fmt::print(csv_.get(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{},{}\n", figures_.cycles,
              static_cast<int>(decision_.state), static_cast<int>(decision_.verdict),
              decision_.phase_error.ns(), decision_.lateness.ns(),
              (sample.received - sample.sent).ns(), decision_.rate.ppb(),
-             main_->last_cycle().working_counter, margin_ns(sample));
+             main_->last_cycle().working_counter, margin_ns(sample), decision_.skipped);
 }
 
 }  // namespace ftcs::app

@@ -11,6 +11,7 @@
 #include "ftcs/analysis/quantile_sketch.h"
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/discipline/lock_watch.h"
 #include "ftcs/ethercat/maindevice/circle_path.h"
 #include "ftcs/ethercat/maindevice/csp_axis.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
@@ -88,8 +89,7 @@ struct RunFigures {
   std::uint64_t host_stalls = 0;  ///< cycles passed over
   std::int64_t lock_cycle = -1;
   std::int64_t op_cycle = -1;
-  std::uint64_t lock_losses = 0;
-  std::int64_t longest_relock = 0;        ///< cycles from the loss of a lock to the next one
+  LockWatch lock;                         ///< how it came and went
   std::uint32_t worst_difference_ns = 0;  ///< bound of |0x092C|, from one second after the lock on
   QuantileSketch lateness;
   QuantileSketch phase;
@@ -148,8 +148,6 @@ class MainRunner {
   /// What was last recorded of a drive.
   enum class Seen : std::uint8_t { kNotYet, kInOp, kLeftOp, kOutOfReach };
   std::vector<Seen> seen_;
-  bool was_locked_ = false;
-  std::uint64_t lost_lock_at_ = 0;
   std::uint64_t unlocked_limit_ = 0;  ///< cycles
   std::uint32_t reintegrated_ = 0;
   std::size_t reintegrating_ = 0;

@@ -67,7 +67,8 @@ std::string relock_text(std::span<const MainRunner* const> runs) {
   for (const MainRunner* run : runs) {
     const RunFigures& figures = run->figures();
     text += fmt::format("{}: lock lost {} times, longest way back {} cycles. ",
-                        run->options().servo_name, figures.lock_losses, figures.longest_relock);
+                        run->options().servo_name, figures.lock.losses(),
+                        figures.lock.longest_relock());
   }
   return text;
 }

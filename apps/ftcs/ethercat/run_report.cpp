@@ -202,9 +202,9 @@ void print_run(const MainRunner& runner) {
              runner.options().servo_name,
              static_cast<double>(runner.options().servo.cycle.count()) * 1e-3, figures.cycles,
              figures.lock_cycle, figures.op_cycle);
-  if (figures.lock_losses > 0) {
-    fmt::print("lock lost {} times; longest way back {} cycles\n", figures.lock_losses,
-               figures.longest_relock);
+  if (figures.lock.losses() > 0) {
+    fmt::print("lock lost {} times; longest way back {} cycles\n", figures.lock.losses(),
+               figures.lock.longest_relock());
   }
   print_events(figures);
   fmt::print(
@@ -224,8 +224,8 @@ void print_run(const MainRunner& runner) {
   print_histograms(figures);
   fmt::print("|0x092C| from one second after the lock: under {} ns (bound)\n",
              figures.worst_difference_ns + 1);
-  fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}\n", runner.decision().rate.ppm(),
-             servo.resyncs, servo.impossible);
+  fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}, doubtful stamps {}\n",
+             runner.decision().rate.ppm(), servo.resyncs, servo.impossible, servo.doubtful);
   if (runner.options().servo.law == CycleLaw::kPics &&
       runner.options().servo.proportional_gain == 1.0 &&
       runner.options().servo.integral_gain == 1.0) {
@@ -244,8 +244,8 @@ Json run_json(const MainRunner& runner) {
             {"cycles_per_sync", runner.options().servo.cycles_per_sync},
             {"locked", runner.decision().state == CycleState::kLocked},
             {"lock_cycle", figures.lock_cycle},
-            {"lock_losses", figures.lock_losses},
-            {"longest_relock_cycles", figures.longest_relock},
+            {"lock_losses", figures.lock.losses()},
+            {"longest_relock_cycles", figures.lock.longest_relock()},
             {"op_cycle", figures.op_cycle},
             {"working_counter_right", figures.working_counter_right},
             {"lost_frames", runner.main().counters().lost},
@@ -265,6 +265,7 @@ Json run_json(const MainRunner& runner) {
             {"late", servo.late},
             {"slow", servo.slow},
             {"impossible", servo.impossible},
+            {"doubtful", servo.doubtful},
             {"resyncs", servo.resyncs},
             {"reintegrated", runner.main().counters().reintegrated},
             {"histograms", histograms_json(figures)},
