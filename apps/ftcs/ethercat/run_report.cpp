@@ -105,6 +105,11 @@ void print_events(const RunFigures& figures) {
   }
 }
 
+std::string describe(const ethercat::Identity& identity) {
+  return fmt::format("vendor 0x{:08X}, product 0x{:08X}, revision 0x{:08X}, serial {}",
+                     identity.vendor, identity.product, identity.revision, identity.serial);
+}
+
 }  // namespace
 
 const char* name(CycleState state) {
@@ -160,6 +165,9 @@ std::string describe(const ethercat::Failure& failure) {
     case FailureKind::kSdoMalformed:
       return fmt::format("{} (object 0x{:04X}:{:02X}, {})", text, failure.object.index,
                          failure.object.subindex, ethercat::name(failure.abort));
+    case FailureKind::kReplaced:
+      return fmt::format("{} (expected {}; found {})", text, describe(failure.known),
+                         describe(failure.found));
     case FailureKind::kBadSii:
       return fmt::format("{} ({})", text, ethercat::name(failure.sii));
     case FailureKind::kLinkLost:

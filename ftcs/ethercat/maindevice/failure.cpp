@@ -37,6 +37,8 @@ const char* name(FailureKind kind) noexcept {
       return "process data larger than one frame";
     case FailureKind::kNoDistributedClock:
       return "no SubDevice with a distributed clock";
+    case FailureKind::kReplaced:
+      return "another SubDevice in the place of the one that was scanned";
     case FailureKind::kClockNotSteady:
       return "clock does not follow the reference";
     case FailureKind::kWorkingCounter:

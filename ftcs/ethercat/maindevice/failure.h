@@ -26,6 +26,7 @@ enum class FailureKind : std::uint8_t {
   kSdoMalformed,          ///< mailbox tells what is wrong
   kProcessImageTooLarge,  ///< more than one frame holds
   kNoDistributedClock,    ///< nobody can be the reference
+  kReplaced,              ///< what was restarted is not what was scanned: known, found
   kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received
   kSyncLost,              ///< the cycle does not follow the reference any more
@@ -46,6 +47,8 @@ struct Failure {
   ObjectAddress object{};
   SdoAbort abort = SdoAbort::kNone;
   SiiError sii = SiiError::kTooShort;
+  Identity known{};
+  Identity found{};
   MailboxError mailbox = MailboxError::kTooShort;
 
   [[nodiscard]] constexpr explicit operator bool() const noexcept {

@@ -16,6 +16,8 @@ constexpr std::uint32_t kMagnitude = 0x7FFFFFFF;
 /// still wrong leaves it within a few of them.
 constexpr std::uint32_t kSteadyDifference = 500;
 constexpr std::uint32_t kSteadyFrames = 200;
+/// As the scan (MainDeviceConfig::sii_timeout).
+constexpr Nanoseconds kSiiTimeout{1'000'000'000};
 constexpr Nanoseconds kSettleTimeout{20'000'000'000};
 }  // namespace
 
@@ -62,6 +64,9 @@ void Reintegrator::request(FrameWriter& writer, const Network& network) noexcept
     case Step::kAwaitInit:
       writer.add(device.target(kFprd, reg::kAlStatus), kAlStatusSize);
       break;
+    case Step::kIdentity:
+      sii_reader_.request(writer, device, sii::kIdentityWord + identity_used_ / 2);
+      break;
     case Step::kPrepareClock:
       writer.add_value(device.target(kFpwr, reg::kSystemTimeDifferenceFilter), kFilters);
       break;
@@ -94,15 +99,13 @@ bool Reintegrator::expired(LocalTime now, Nanoseconds limit) noexcept {
   return now >= deadline_;
 }
 
-Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& device, bool clocked,
-                                  LocalTime now, Failure& failure) noexcept {
+Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& device, LocalTime now,
+                                  Failure& failure) noexcept {
   device.set_al_status(datagram.data());
   if (device.state == AlState::kInit && !device.error) {
-    if (clocked) {
-      enter(Step::kPrepareClock);
-    } else {
-      begin_configuration();
-    }
+    enter(Step::kIdentity);
+    identity_used_ = 0;
+    sii_reader_.start(kSiiTimeout);
     return Progress::kContinue;
   }
   if (!expired(now, config_.state_timeout)) return Progress::kContinue;
@@ -111,6 +114,31 @@ Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& devic
                         .wanted = AlState::kInit,
                         .actual = device.state,
                         .code = device.code});
+}
+
+Progress Reintegrator::identify(const FrameView& frame, const Network& network, LocalTime now,
+                                Failure& failure) noexcept {
+  ConstBytes words;
+  const Progress progress = sii_reader_.reply(frame, position_, now, words, failure);
+  if (progress != Progress::kDone) return progress;
+  const std::size_t size = std::min(words.size(), identity_.size() - identity_used_);
+  std::copy_n(words.begin(), size, Bytes{identity_}.subspan(identity_used_).begin());
+  identity_used_ += size;
+  if (identity_used_ < identity_.size()) return Progress::kContinue;
+  const SubDeviceInfo& device = network.devices[position_];
+  const Identity found = decode_identity(identity_);
+  if (!(found == device.sii.identity)) {
+    return fail(failure, {.kind = FailureKind::kReplaced,
+                          .position = static_cast<std::uint16_t>(position_),
+                          .known = device.sii.identity,
+                          .found = found});
+  }
+  if (network.has_reference() && device.dc()) {
+    enter(Step::kPrepareClock);
+  } else {
+    begin_configuration();
+  }
+  return Progress::kContinue;
 }
 
 Progress Reintegrator::settle(const Datagram& datagram, LocalTime now, Failure& failure) noexcept {
@@ -154,7 +182,10 @@ Progress Reintegrator::reply(const FrameView& frame, Network& network, Reference
       enter(Step::kAwaitInit);
       break;
     case Step::kAwaitInit:
-      progress = await_init(first, device, network.has_reference() && device.dc(), now, failure);
+      progress = await_init(first, device, now, failure);
+      break;
+    case Step::kIdentity:
+      progress = identify(frame, network, now, failure);
       break;
     case Step::kPrepareClock:
       enter(Step::kLatch);

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "ftcs/ethercat/maindevice/configurator.h"
 #include "ftcs/ethercat/maindevice/network.h"
 #include "ftcs/ethercat/maindevice/procedure.h"
+#include "ftcs/ethercat/maindevice/sii_reader.h"
 
 namespace ftcs::ethercat {
 
 /// Brings one SubDevice that was restarted back to SAFEOP while the others run: its datagrams ride
-/// behind those of the cycle. Station address, INIT, clock, then what the Configurator does for
+/// behind those of the cycle. Station address, INIT, identity (another SubDevice in its place is
+/// left alone), clock, then what the Configurator does for
 /// everybody; sizes and places in the process image are known.
 ///
 /// Its clock is set from one cycle's frame, which latched its local time (0x0918) and carried the
@@ -40,6 +43,7 @@ class Reintegrator {
     kAddress,
     kReset,
     kAwaitInit,
+    kIdentity,
     kPrepareClock,
     kLatch,
     kReadLatch,
@@ -47,8 +51,10 @@ class Reintegrator {
     kSettle,
     kConfigure,
   };
-  [[nodiscard]] Progress await_init(const Datagram& datagram, SubDeviceInfo& device, bool clocked,
-                                    LocalTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress await_init(const Datagram& datagram, SubDeviceInfo& device, LocalTime now,
+                                    Failure& failure) noexcept;
+  [[nodiscard]] Progress identify(const FrameView& frame, const Network& network, LocalTime now,
+                                  Failure& failure) noexcept;
   [[nodiscard]] Progress settle(const Datagram& datagram, LocalTime now, Failure& failure) noexcept;
   [[nodiscard]] bool expired(LocalTime now, Nanoseconds limit) noexcept;
   void enter(Step step) noexcept;
@@ -62,6 +68,9 @@ class Reintegrator {
   Step step_ = Step::kAddress;
   LocalTime deadline_;
   bool deadline_set_ = false;
+  SiiReader sii_reader_;
+  std::array<std::uint8_t, 16> identity_{};
+  std::size_t identity_used_ = 0;
   ReferenceTime latched_;     ///< reference time of the frame that latched
   std::uint32_t steady_ = 0;  ///< frames in a row with a small 0x092C
 };

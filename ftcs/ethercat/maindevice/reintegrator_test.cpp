@@ -138,6 +138,32 @@ TEST_F(Restart, a_drive_that_cannot_be_configured_again_stops_the_others_in_good
   EXPECT_EQ(drive(1).code(), AlStatusCode::kNoError);
 }
 
+TEST_F(Restart, another_drive_in_its_place_is_not_configured_and_the_others_are_stopped) {
+  to_op();
+  SubDeviceConfig other;
+  other.identity.product += 1;
+  bench_.segment().replace(3, other, bench_.crystal(3), bench_.now());
+  cycles(9000);
+  EXPECT_EQ(main().stage(), Stage::kStopped);
+  EXPECT_EQ(main().failure().kind, FailureKind::kReplaced);
+  EXPECT_EQ(main().failure().position, 3);
+  EXPECT_EQ(main().failure().known, main().network().devices[3].sii.identity);
+  EXPECT_EQ(main().failure().found, other.identity);
+  EXPECT_EQ(drive(3).state(), AlState::kInit) << "it was told nothing";
+  EXPECT_EQ(drive(1).state(), AlState::kSafeOp);
+  EXPECT_EQ(drive(1).code(), AlStatusCode::kNoError);
+}
+
+TEST_F(Restart, the_same_type_with_another_serial_number_is_another_drive) {
+  to_op();
+  SubDeviceConfig other;
+  other.identity.serial = 4711;
+  bench_.segment().replace(7, other, bench_.crystal(7), bench_.now());
+  cycles(9000);
+  EXPECT_EQ(main().failure().kind, FailureKind::kReplaced);
+  EXPECT_EQ(main().failure().found.serial, 4711U);
+}
+
 class CutAndMended : public Restart {
  protected:
   CutAndMended() : Restart(1'000'000) {}

@@ -7,12 +7,8 @@ namespace ftcs::ethercat {
 
 namespace {
 constexpr std::uint16_t kResetToInit = 0x0011;  // INIT, and acknowledge any error
-constexpr std::uint16_t kSiiBusy = 0x8000;
-constexpr std::uint16_t kSiiEightBytes = 0x0040;
-constexpr std::uint16_t kSiiReadCommand = 0x0100;
 constexpr std::size_t kIdentitySize = 10;
 constexpr std::size_t kAlStatusSize = 6;
-constexpr std::size_t kSiiReplySize = 14;  // control 2, address 4, data 8
 }  // namespace
 
 void Scanner::start(std::size_t expected, Nanoseconds timeout) noexcept {
@@ -62,15 +58,8 @@ void Scanner::request(FrameWriter& writer, const Network& network) noexcept {
       writer.add(device.target(kFprd, reg::kAlStatus), kAlStatusSize);
       writer.add(device.target(kFprd, reg::kStationAlias), 2);
       break;
-    case Step::kReadSii: {
-      const Bytes command = writer.add(device.target(kFpwr, reg::kSiiControl), 6);
-      store(command, 0, kSiiReadCommand);
-      store(command, 2, static_cast<std::uint32_t>(image_used_ / 2));
-      writer.add(device.target(kFprd, reg::kSiiControl), kSiiReplySize);
-      break;
-    }
-    case Step::kPollSii:
-      writer.add(device.target(kFprd, reg::kSiiControl), kSiiReplySize);
+    case Step::kReadSii:
+      sii_reader_.request(writer, device, image_used_ / 2);
       break;
   }
 }
@@ -88,7 +77,6 @@ Progress Scanner::reply(const FrameView& frame, Network& network, LocalTime now,
     case Step::kIdentify:
       return identify(frame, network, now, failure);
     case Step::kReadSii:
-    case Step::kPollSii:
       break;
   }
   return read_sii(frame, network, now, failure);
@@ -162,6 +150,7 @@ Progress Scanner::identify(const FrameView& frame, Network& network, LocalTime n
   if (++device_ == network.count) {
     device_ = 0;
     image_used_ = 0;
+    sii_reader_.start(timeout_);
     step_ = Step::kReadSii;
   }
   return Progress::kContinue;
@@ -169,22 +158,11 @@ Progress Scanner::identify(const FrameView& frame, Network& network, LocalTime n
 
 Progress Scanner::read_sii(const FrameView& frame, Network& network, LocalTime now,
                            Failure& failure) noexcept {
-  const Datagram answer = frame[step_ == Step::kReadSii ? 1 : 0];
-  const ConstBytes data = answer.data();
-  const auto control = load<std::uint16_t>(data, 0);
-  if (answer.working_counter() != 1 || (control & kSiiBusy) != 0) {
-    if (!deadline_set_) deadline_ = now + timeout_;
-    deadline_set_ = true;
-    step_ = answer.working_counter() == 1 ? Step::kPollSii : Step::kReadSii;
-    if (now < deadline_) return Progress::kContinue;
-    return fail(failure, {.kind = FailureKind::kSiiTimeout, .position = position()});
-  }
-  deadline_set_ = false;
-  step_ = Step::kReadSii;
-  const std::size_t size = (control & kSiiEightBytes) != 0 ? 8 : 4;
-  const ConstBytes words = data.subspan(6, size);
+  ConstBytes words;
+  const Progress progress = sii_reader_.reply(frame, device_, now, words, failure);
+  if (progress != Progress::kDone) return progress;
   std::copy(words.begin(), words.end(), Bytes{image_}.subspan(image_used_).begin());
-  image_used_ += size;
+  image_used_ += words.size();
   return next_sii_word(network, failure);
 }
 
@@ -212,8 +190,7 @@ Progress Scanner::next_sii_word(Network& network, Failure& failure) noexcept {
 /// Vendor, product and revision of a SubDevice read before: only alias and serial number differ.
 bool Scanner::take_from_twin(Network& network) const noexcept {
   SubDeviceInfo& device = network.devices[device_];
-  const Identity own{load<std::uint32_t>(image_, 0x10), load<std::uint32_t>(image_, 0x14),
-                     load<std::uint32_t>(image_, 0x18), load<std::uint32_t>(image_, 0x1C)};
+  const Identity own = decode_identity(ConstBytes{image_}.subspan(sii::kIdentityWord * 2));
   for (std::size_t n = 0; n < device_; ++n) {
     const Identity& other = network.devices[n].sii.identity;
     if (other.vendor != own.vendor || other.product != own.product ||

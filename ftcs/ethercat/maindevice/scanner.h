@@ -6,6 +6,7 @@
 
 #include "ftcs/ethercat/maindevice/network.h"
 #include "ftcs/ethercat/maindevice/procedure.h"
+#include "ftcs/ethercat/maindevice/sii_reader.h"
 
 namespace ftcs::ethercat {
 
@@ -20,7 +21,7 @@ class Scanner {
                                Failure& failure) noexcept;
 
  private:
-  enum class Step : std::uint8_t { kCount, kReset, kAddress, kIdentify, kReadSii, kPollSii };
+  enum class Step : std::uint8_t { kCount, kReset, kAddress, kIdentify, kReadSii };
   [[nodiscard]] Progress count(const FrameView& frame, Network& network, Failure& failure) noexcept;
   [[nodiscard]] Progress addressed(const FrameView& frame, Network& network,
                                    Failure& failure) noexcept;
@@ -45,6 +46,7 @@ class Scanner {
   std::size_t device_ = 0;
   LocalTime deadline_;
   bool deadline_set_ = false;
+  SiiReader sii_reader_;
   std::array<std::uint8_t, kImageSize> image_{};
   std::size_t image_used_ = 0;
   std::size_t category_at_ = 0;

@@ -123,4 +123,11 @@ void Segment::set_cut(std::size_t number, bool cut) noexcept {
   plan();
 }
 
+void Segment::replace(std::size_t number, const SubDeviceConfig& config,
+                      LocalOscillator& oscillator, WireTime now) noexcept {
+  devices_[number].emplace(config, oscillator);
+  plan();
+  devices_[number]->power_cycle(now);
+}
+
 }  // namespace ftcs::ethercat

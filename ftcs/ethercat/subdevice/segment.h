@@ -61,6 +61,9 @@ class Segment {
   void power_cycle(std::size_t number, WireTime now) noexcept {
     devices_[number]->power_cycle(now);
   }
+  /// Another SubDevice is put in its place and switched on.
+  void replace(std::size_t number, const SubDeviceConfig& config, LocalOscillator& oscillator,
+               WireTime now) noexcept;
 
  private:
   /// One station on a frame's way: it arrives at this port so long after the first arrival.

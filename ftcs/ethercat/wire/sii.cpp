@@ -83,6 +83,11 @@ std::uint8_t sii_checksum(ConstBytes first_words) noexcept {
   return static_cast<std::uint8_t>(crc);
 }
 
+Identity decode_identity(ConstBytes words) noexcept {
+  return {double_word(words, 0), double_word(words, 2), double_word(words, 4),
+          double_word(words, 6)};
+}
+
 Result<SiiContent, SiiError> decode_sii(ConstBytes image) noexcept {
   if (image.size() < sii::kCategoriesWord * kBytesPerWord) return SiiError::kTooShort;
   if (sii_checksum(image) != image[sii::kChecksumWord * kBytesPerWord]) {
@@ -90,8 +95,7 @@ Result<SiiContent, SiiError> decode_sii(ConstBytes image) noexcept {
   }
   SiiContent content;
   content.alias = word(image, sii::kAliasWord);
-  content.identity = {double_word(image, 0x08), double_word(image, 0x0A), double_word(image, 0x0C),
-                      double_word(image, 0x0E)};
+  content.identity = decode_identity(image.subspan(sii::kIdentityWord * 2));
   content.receive = {word(image, 0x18), word(image, 0x19)};
   content.send = {word(image, 0x1A), word(image, 0x1B)};
   content.protocols = word(image, sii::kProtocolsWord);

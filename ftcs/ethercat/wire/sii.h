@@ -43,6 +43,7 @@ struct Identity {
   std::uint32_t product = 0;
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
+  friend constexpr bool operator==(const Identity&, const Identity&) noexcept = default;
 };
 
 struct MailboxWindow {
@@ -74,6 +75,8 @@ struct SiiContent {
 
 /// x^8 + x^2 + x + 1, start 0xFF, over words 0 to 6 (ETG.1000.6, table 16).
 [[nodiscard]] std::uint8_t sii_checksum(ConstBytes first_words) noexcept;
+/// Of the four double words at kIdentityWord.
+[[nodiscard]] Identity decode_identity(ConstBytes words) noexcept;
 /// Checked decoding of a whole image. Unknown categories are skipped.
 [[nodiscard]] Result<SiiContent, SiiError> decode_sii(ConstBytes image) noexcept;
 
