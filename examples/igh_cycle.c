@@ -8,33 +8,18 @@
  * IgH hands out the reference time of the cycle before, 32 bits: scheduled_ns and ftcs_cycle_unwrap(). */
 #define _GNU_SOURCE
 
-#include <errno.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 
 #include "ecrt.h"
+#include "examples/monotonic.h"
 #include "ftcs/discipline/ftcs_cycle_servo.h"
 
-static const int64_t kSecond = 1000000000;
 static const int64_t kCycle = 1000000;
 static const uint16_t kAssignActivate = 0x0300; /* SYNC0, as most drives have it */
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kSecond + now.tv_nsec;
-}
-
-static void sleep_until(int64_t instant_ns) {
-  struct timespec wake;
-  wake.tv_sec = instant_ns / kSecond;
-  wake.tv_nsec = instant_ns % kSecond;
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, NULL) == EINTR) continue;
-}
 
 /* Drives with the mapping that their SII describes; SYNC0 half a cycle after the frames. */
 static int configure(ec_master_t* master, ec_domain_t* domain, int drives, uint32_t vendor,

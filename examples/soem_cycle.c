@@ -11,39 +11,24 @@
  * Exit codes: 0 locked and in OP to the end, 1 not, 2 wrong usage. */
 #define _GNU_SOURCE
 
-#include <errno.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 
+#include "examples/monotonic.h"
 #include "ftcs/discipline/ftcs_cycle_servo.h"
 #include "soem/soem.h"
 
 enum { MOST_CYCLES = 1000000 };
 
-static const int64_t kSecond = 1000000000;
 static const char* const kLaws[] = {"none", "ftcs", "pics", "adaptive"};
 
 static ecx_contextt context;
 static uint8 process_image[4096];
 static int64_t cycle_ns = 1000000;
 static int32_t phases[MOST_CYCLES]; /* of the virtual cycle, since the lock */
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kSecond + now.tv_nsec;
-}
-
-static void sleep_until(int64_t instant_ns) {
-  struct timespec wake;
-  wake.tv_sec = instant_ns / kSecond;
-  wake.tv_nsec = instant_ns % kSecond;
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, NULL) == EINTR) continue;
-}
 
 static void become_realtime(void) {
   const struct sched_param priority = {.sched_priority = 40}; /* as ec_sample's thread */

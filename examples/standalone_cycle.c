@@ -7,29 +7,14 @@
  * read when a "frame" is sent. The task's lateness is the host's own. Exit code 1: not locked. */
 #define _POSIX_C_SOURCE 200809L
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "examples/monotonic.h"
 #include "ftcs/discipline/ftcs_cycle_servo.h"
 
-static const int64_t kSecond = 1000000000;
 static const char* const kLaws[] = {"none", "ftcs", "pics", "adaptive"};
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kSecond + now.tv_nsec;
-}
-
-static void sleep_until(int64_t instant_ns) {
-  struct timespec wake;
-  wake.tv_sec = instant_ns / kSecond;
-  wake.tv_nsec = instant_ns % kSecond;
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, NULL) == EINTR) continue;
-}
 
 /* What the reference SubDevice would latch from a frame that is sent at an instant of the host. */
 static int64_t reference_at(int64_t host_ns) { return 848614739450471667 + host_ns + host_ns / 20000; }
