@@ -206,5 +206,34 @@ TEST(DistributedClock, the_speed_counter_tells_the_deviation_by_its_formula) {
   EXPECT_NEAR(d / (5 * (kStart + d + 2) * (kStart - d + 2)) * 1e6, -80.0, 0.5);
 }
 
+/// 0x092C after one drift datagram that is so much ahead of, or behind, the local copy.
+std::uint32_t difference_after(const SubDeviceConfig& config, std::int64_t local_minus_received) {
+  using enum Command;
+  test::WireBench bench;
+  bench.set_step(Nanoseconds{100'000});
+  bench.add({}, 0.0, config);
+  const auto own = bench.read({kBrd, 0, reg::kSystemTime}, 8).value<std::uint64_t>();
+  bench.write({kBwr, 0, reg::kSystemTime},
+              own + 100'000 - static_cast<std::uint64_t>(local_minus_received));
+  const auto shown = bench.read({kBrd, 0, reg::kSystemTimeDifference}, 4).value<std::uint32_t>();
+  const std::int32_t difference = bench.segment()[0].system_time_difference();
+  EXPECT_EQ(difference > 0, local_minus_received > 0) << "whatever bit 31 means";
+  return shown;
+}
+
+TEST(SystemTimeDifference, bit_31_means_ahead_or_behind_as_configured) {
+  constexpr std::uint32_t kBit31 = 0x80000000U;
+  SubDeviceConfig config;
+  const std::uint32_t ahead = difference_after(config, 500);
+  const std::uint32_t behind = difference_after(config, -500);
+  EXPECT_EQ(ahead & kBit31, kBit31);
+  EXPECT_EQ(behind & kBit31, 0U);
+  EXPECT_NEAR(static_cast<double>(ahead & ~kBit31), 500.0, 20.0);
+  EXPECT_NEAR(static_cast<double>(behind), 500.0, 20.0);
+  config.clock.sign_bit_means_ahead = false;
+  EXPECT_EQ(difference_after(config, 500), ahead & ~kBit31);
+  EXPECT_EQ(difference_after(config, -500), behind | kBit31);
+}
+
 }  // namespace
 }  // namespace ftcs::ethercat
