@@ -43,7 +43,7 @@ class BasicCycleServo {
     return history_.local_at(instant);
   }
   /// Number of the coming trigger on the grid of reference time.
-  [[nodiscard]] CycleTrigger next_trigger() const noexcept { return timer_.next(history_); }
+  [[nodiscard]] CycleTrigger next_trigger() const noexcept { return trigger_; }
 
  private:
   [[nodiscard]] CycleVerdict judge(const CycleSample& sample) const noexcept;
@@ -53,7 +53,7 @@ class BasicCycleServo {
   [[nodiscard]] bool doubtful(Duration error) noexcept;
   [[nodiscard]] bool sample_due() const noexcept;
   [[nodiscard]] ServoUpdate ask_law(const CycleSample& sample, FreeRunningTime stamp,
-                                    const ClockReading& now) noexcept;
+                                    LocalTime local, FreeRunningTime now) noexcept;
   void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
   void restart_law() noexcept;
   [[nodiscard]] bool rate_known() const noexcept;

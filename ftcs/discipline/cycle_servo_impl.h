@@ -187,7 +187,8 @@ void BasicCycleServo<Adaptive>::follow(const CycleSample& sample, FreeRunningTim
                                        FreeRunningTime now) noexcept {
   // E: early is positive, as local minus reference is.
   const ReferenceTime reference = sample.reference - Duration{config_.transit};
-  const Duration error = offset_from_reference(history_.local_at(stamp), reference);
+  const LocalTime local = history_.local_at(stamp);
+  const Duration error = offset_from_reference(local, reference);
   const bool off =
       abs(error) > Duration{config_.cycle}.half() + Duration{config_.cycle}.half().half();
   out_of_phase_ = off ? out_of_phase_ + 1 : 0;
@@ -206,7 +207,7 @@ void BasicCycleServo<Adaptive>::follow(const CycleSample& sample, FreeRunningTim
   if (rate_known() && !doubted) lock_.update(error);
   // The adaptive servo weighs each sample itself.
   if (doubted && config_.law != CycleLaw::kAdaptive) return;
-  const ServoUpdate update = ask_law(sample, stamp, {now, history_.local_at(now)});
+  const ServoUpdate update = ask_law(sample, stamp, local, now);
   if (update.has_command) apply(update.command, now);
 }
 
@@ -231,17 +232,17 @@ bool BasicCycleServo<Adaptive>::sample_due() const noexcept {
 
 template <class Adaptive>
 ServoUpdate BasicCycleServo<Adaptive>::ask_law(const CycleSample& sample, FreeRunningTime stamp,
-                                               const ClockReading& now) noexcept {
+                                               LocalTime local, FreeRunningTime now) noexcept {
+  const bool adaptive = config_.law == CycleLaw::kAdaptive;
+  if (!adaptive && !sample_due()) return {};
   const ReferenceTime reference = sample.reference - Duration{config_.transit};
-  const LocalTime local = history_.local_at(stamp);
-  if (config_.law == CycleLaw::kNone) return {};
-  if (config_.law == CycleLaw::kAdaptive) {
-    return adaptive_.update({Direction::kBackward, reference, local, stamp}, now);
+  const ClockReading reading{now, history_.local_at(now)};
+  if (adaptive) {
+    return adaptive_.update({Direction::kBackward, reference, local, stamp}, reading);
   }
-  if (!sample_due()) return {};
   until_sync_ = config_.cycles_per_sync;
   const SyncSample sync{reference, Duration{}, local, stamp};
-  return config_.law == CycleLaw::kFtcs ? ftcs_.update(sync, now) : pics_.update(sync, now);
+  return config_.law == CycleLaw::kFtcs ? ftcs_.update(sync, reading) : pics_.update(sync, reading);
 }
 
 template <class Adaptive>
