@@ -25,7 +25,7 @@ to=(--udp "127.0.0.1:$port")
 
 "$ftcs" ethercat scan "${to[@]}" > "$folder/nobody" 2>&1
 [ $? -eq 1 ] || fail "nobody there: expected exit code 1"
-grep -q "no reply" "$folder/nobody" || fail "nobody there: no clear error"
+grep -q "no reply from 127.0.0.1:$port" "$folder/nobody" || fail "nobody there: no clear error"
 "$ftcs" ethercat scan -i no-such-if > "$folder/interface" 2>&1
 [ $? -eq 1 ] || fail "wrong interface: expected exit code 1"
 "$ftcs" ethercat run --cycle 3x > "$folder/usage" 2>&1
@@ -48,8 +48,30 @@ code=$?
 [ $code -eq 0 ] || [ $code -eq 3 ] || fail "run: exit code $code"
 grep -q '"op_cycle": [0-9]' "$folder/run.json" || fail "run: the drives did not reach OP"
 
+# Records that cannot be written: known before the drives are touched, or said while they go on.
+quick=(--drives 8 --cycle 4ms --sync-interval 200ms --gate 2ms)
+short=(--drift-pulses 200 --duration 2)
+"$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" --csv "$folder/none/x.csv" > "$folder/csv" 2>&1
+[ $? -eq 1 ] && grep -q "cannot write .*x.csv: No such file" "$folder/csv" || fail "CSV in a folder that is not there"
+grep -q "scan" "$folder/csv" && fail "CSV in a folder that is not there: the drives were touched"
+mkdir "$folder/record"
+mkfifo "$folder/record/pipe"
+head -n 20 "$folder/record/pipe" > "$folder/lines" &
+"$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" -q --csv "$folder/record/pipe" --json "$folder/cut.json" > "$folder/cut" 2>&1
+[ $? -eq 1 ] && grep -q "cannot write .*pipe: Broken pipe (the run went on without it)" "$folder/cut" || fail "CSV cut short"
+[ "$(wc -l < "$folder/lines")" -eq 20 ] && grep -q '"cycles": [1-9]' "$folder/cut.json" || fail "CSV cut short: no figures"
+if [ -w /dev/full ]; then
+  "$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" > /dev/full 2> "$folder/full"
+  [ $? -eq 1 ] && grep -q "cannot write" "$folder/full" || fail "standard output full"
+fi
+timeout -s INT 2 "$ftcs" ethercat run "${to[@]}" "${quick[@]}" --drift-pulses 1000000 > "$folder/early" 2>&1
+grep -q "stopped by a signal before the first cycle" "$folder/early" || fail "interrupted bring-up"
+timeout --preserve-status -s INT 3 "$ftcs" ethercat run "${to[@]}" "${quick[@]}" --drift-pulses 200 --duration 0 > "$folder/interrupted" 2>&1
+code=$?
+[ $code -eq 0 ] || [ $code -eq 3 ] || fail "interrupted: exit code $code"
+
 # A reference that runs 5 % too fast from the seventh second on is beyond what the cycle may be bent: a defined end.
-"$ftcs" ethercat-segment --udp $((port + 1)) --drives 2 --priority 70 --fault skew:0@5=50000 --duration 40 > "$folder/skewed" 2>&1 &
+"$ftcs" ethercat-segment --udp $((port + 1)) --drives 2 --priority 70 --fault skew:0@5=50000 --duration 40 --sign-bit-behind > "$folder/skewed" 2>&1 &
 skewed=$!
 sleep 0.3
 "$ftcs" ethercat run --udp "127.0.0.1:$((port + 1))" --drives 2 --servo adaptive --cycle 4ms --gate 2ms --drift-pulses 200 -q \
@@ -61,4 +83,6 @@ kill -INT "$segment"
 wait "$segment" || fail "segment: exit code $?, expected 0 after SIGINT"
 segment=
 grep -q '"sync0_events": [1-9]' "$folder/segment.json" || fail "segment: no SYNC0 in OP"
+# Ctrl-C ended the last run, and the drives were told: none found out by its watchdog.
+[ "$(grep -cE "^drive +[0-9]+ +SAFEOP +0x0000" "$folder/segment")" -eq 8 ] || fail "segment: not all drives in SAFEOP without an error"
 echo "ok"

@@ -96,22 +96,39 @@ Result<platform::EthercatLink, platform::OsError> open_link(const RunOptions& op
                                    : platform::EthercatLink::open_raw(options.interface);
 }
 
-int run_scan(EthercatArguments arguments) {
-  if (const auto wrong = complete(arguments)) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
-    return kUsageError;
+int end_with(const std::string& message, int exit_code) {
+  fmt::print(stderr, "ftcs ethercat: {}\n", message);
+  return exit_code;
+}
+
+int end_with(const ethercat::Failure& failure, const RunOptions& options) {
+  if (!failure) return end_with("stopped by a signal before the first cycle", kNotLocked);
+  if (failure.kind != ethercat::FailureKind::kNoReply) {
+    return end_with(describe(failure), kRuntimeError);
   }
+  const std::string where =
+      options.interface.empty()
+          ? fmt::format("from {}:{}: does ftcs ethercat-segment run there?", options.host,
+                        options.port)
+          : fmt::format("on interface {}: is a SubDevice with power connected to it?",
+                        options.interface);
+  return end_with(fmt::format("{} {}", describe(failure), where), kRuntimeError);
+}
+
+using Body = int (*)(MainRunner& runner, const std::function<bool()>& stop);
+
+/// What scan and run begin with: flags checked, link open.
+int with_runner(EthercatArguments arguments, Body body) {
+  if (const auto wrong = complete(arguments)) return end_with(*wrong, kUsageError);
   auto link = open_link(arguments.options);
-  if (!link) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", link.error().message());
-    return kRuntimeError;
-  }
-  const platform::StopFlag stop;
-  MainRunner runner(arguments.options, std::move(*link));
-  if (!runner.bring_up([&stop] { return stop.is_set(); }, true)) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner.main().failure()));
-    return kRuntimeError;
-  }
+  if (!link) return end_with(link.error().message(), kRuntimeError);
+  const platform::StopFlag stop_flag;
+  const auto runner = std::make_unique<MainRunner>(arguments.options, std::move(*link));
+  return body(*runner, [&stop_flag] { return stop_flag.is_set(); });
+}
+
+int run_scan(MainRunner& runner, const std::function<bool()>& stop) {
+  if (!runner.bring_up(stop, true)) return end_with(runner.main().failure(), runner.options());
   print_scan(runner.main());
   return kSuccess;
 }
@@ -128,48 +145,34 @@ void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options
   }
 }
 
-int run_main(EthercatArguments arguments) {
-  if (const auto wrong = complete(arguments)) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
-    return kUsageError;
+std::optional<WriteError> write_reports(const MainRunner& runner) {
+  const RunOptions& options = runner.options();
+  if (!options.json.empty()) {
+    if (auto error = write_file(options.json, dump(run_json(runner)))) return error;
   }
-  const RunOptions& options = arguments.options;
-  auto link = open_link(options);
-  if (!link) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", link.error().message());
-    return kRuntimeError;
-  }
-  const platform::StopFlag stop_flag;
-  const auto stop = [&stop_flag] { return stop_flag.is_set(); };
-  const auto runner = std::make_unique<MainRunner>(options, std::move(*link));
+  if (options.html.empty()) return std::nullopt;
+  const MainRunner* const runs[] = {&runner};
+  HtmlReport report("EtherCAT: a cycle that follows the distributed clock", options.servo_name);
+  add_run_sections(report, runs);
+  return write_file(options.html, report.render());
+}
+
+int run_main(MainRunner& runner, const std::function<bool()>& stop) {
+  const RunOptions& options = runner.options();
+  if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
-  if (!runner->bring_up(stop, false)) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner->main().failure()));
-    return kRuntimeError;
-  }
-  runner->run(stop);
-  if (!options.quiet) print_run(*runner);
-  if (!options.json.empty()) {
-    if (const auto error = write_file(options.json, dump(run_json(*runner)))) {
-      fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
-      return kRuntimeError;
-    }
-  }
-  if (!options.html.empty()) {
-    const MainRunner* const runs[] = {runner.get()};
-    HtmlReport report("EtherCAT: a cycle that follows the distributed clock", options.servo_name);
-    add_run_sections(report, runs);
-    if (const auto error = write_file(options.html, report.render())) {
-      fmt::print(stderr, "ftcs ethercat: {}\n", error->message);
-      return kRuntimeError;
-    }
-  }
-  if (runner->main().failure()) {
-    fmt::print(stderr, "ftcs ethercat: {}\n", describe(runner->main().failure()));
-    return kRuntimeError;
-  }
-  return runner->decision().state == CycleState::kLocked ? kSuccess : kNotLocked;
+  if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
+  runner.run(stop);
+  if (!options.quiet) print_run(runner);
+  // The figures are written even if a record is cut short, and whatever ended the run.
+  const auto reports = write_reports(runner);
+  const auto csv = runner.finish_csv();
+  if (csv) end_with(csv->message + " (the run went on without it)", kRuntimeError);
+  if (reports) end_with(reports->message, kRuntimeError);
+  if (runner.main().failure()) return end_with(runner.main().failure(), options);
+  if (csv || reports) return kRuntimeError;
+  return runner.decision().state == CycleState::kLocked ? kSuccess : kNotLocked;
 }
 
 void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
@@ -241,11 +244,11 @@ void add_ethercat_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<EthercatArguments>();
   CLI::App* scan = command->add_subcommand("scan", "what is on the wire");
   add_link_flags(*scan, *arguments);
-  scan->callback([arguments, &exit_code] { exit_code = run_scan(*arguments); });
+  scan->callback([arguments, &exit_code] { exit_code = with_runner(*arguments, run_scan); });
   CLI::App* run = command->add_subcommand("run", "drives in OP, cycle in phase with their clock");
   add_link_flags(*run, *arguments);
   add_run_flags(*run, *arguments);
-  run->callback([arguments, &exit_code] { exit_code = run_main(*arguments); });
+  run->callback([arguments, &exit_code] { exit_code = with_runner(*arguments, run_main); });
 }
 
 }  // namespace ftcs::app

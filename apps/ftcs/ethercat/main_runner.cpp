@@ -58,12 +58,6 @@ MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
   objects_.assign(objects.begin(), objects.end());
   objects_.push_back({{0x10F1, 2}, 2, options.sync_error_limit, false});
   servo_ = std::make_unique<CycleServo>(options.servo);
-  if (!options.csv.empty()) csv_.reset(std::fopen(options.csv.c_str(), "w"));
-  if (csv_) {
-    fmt::print(csv_.get(),
-               "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,"
-               "working_counter,margin_ns,skipped\n");
-  }
 }
 
 bool MainRunner::exchange(FreeRunningTime deadline, CycleSample* sample) {
@@ -129,13 +123,21 @@ void MainRunner::run(const std::function<bool()>& stop) {
   start_ = HostClock::now();
   next_line_ = start_ + Duration{kLineInterval};
   decision_ = servo_->start(start_);
-  while (!stop() && main_->stage() == ethercat::Stage::kCyclic) {
-    if (options_.duration_s > 0.0 && (HostClock::now() - start_).seconds() > options_.duration_s) {
-      break;
+  try {
+    while (!stop() && main_->stage() == ethercat::Stage::kCyclic) {
+      const double elapsed_s = (HostClock::now() - start_).seconds();
+      if (options_.duration_s > 0.0 && elapsed_s > options_.duration_s) break;
+      cycle();
     }
-    cycle();
+  } catch (...) {  // live lines that cannot be printed
+    stop_drives();
+    throw;
   }
-  // The drives shall not find out by their watchdogs.
+  stop_drives();
+}
+
+/// They shall not find out by their watchdogs.
+void MainRunner::stop_drives() {
   main_->stop();
   while (main_->stage() != ethercat::Stage::kStopped) {
     exchange(HostClock::now() + Duration{kReplyTimeout}, nullptr);
@@ -163,7 +165,9 @@ void MainRunner::cycle() {
   watch_drives();
   if (options_.contour) watch_contour();
   supervise();
-  if (csv_) write_csv(sample);
+  if (csv_.is_open()) {
+    csv_.write(figures_.cycles, decision_, sample, report.working_counter, margin_ns(sample));
+  }
   if (HostClock::now() >= next_line_) {
     next_line_ = next_line_ + Duration{kLineInterval};
     link_.refresh_clock();
@@ -341,14 +345,6 @@ void MainRunner::print_live() const {
       report.expected, report.states, report.difference_bound_ns + 1, main_->counters().lost,
       servo_->counters().late);
   std::fflush(stdout);
-}
-
-void MainRunner::write_csv(const CycleSample& sample) {
-  fmt::print(csv_.get(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{},{}\n", figures_.cycles,
-             static_cast<int>(decision_.state), static_cast<int>(decision_.verdict),
-             decision_.phase_error.ns(), decision_.lateness.ns(),
-             (sample.received - sample.sent).ns(), decision_.rate.ppb(),
-             main_->last_cycle().working_counter, margin_ns(sample), decision_.skipped);
 }
 
 }  // namespace ftcs::app

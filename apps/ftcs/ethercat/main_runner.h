@@ -2,12 +2,13 @@
 #pragma once
 
 #include <array>
-#include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/ftcs/ethercat/cycle_csv.h"
 #include "ftcs/analysis/quantile_sketch.h"
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/discipline/cycle_servo.h"
@@ -108,6 +109,11 @@ struct RunFigures {
 class MainRunner {
  public:
   MainRunner(const RunOptions& options, platform::EthercatLink link);
+  /// The file of --csv, if there is one; before bring_up().
+  [[nodiscard]] std::optional<WriteError> open_csv() {
+    return options_.csv.empty() ? std::nullopt : csv_.open(options_.csv);
+  }
+  [[nodiscard]] std::optional<WriteError> finish_csv() { return csv_.finish(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).
   bool bring_up(const std::function<bool()>& stop, bool scan_only);
   /// The cyclic part.
@@ -129,13 +135,13 @@ class MainRunner {
   void note(const CycleSample& sample, bool answered);
   void trace(const CycleSample& sample);
   void supervise();
+  void stop_drives();
   void watch_lock();
   void watch_drives();
   void watch_contour();
   void record(RunEvent::Kind kind, std::size_t drive = RunEvent::kNobody,
               ethercat::AlStatusCode code = ethercat::AlStatusCode::kNoError);
   void print_live() const;
-  void write_csv(const CycleSample& sample);
   [[nodiscard]] std::int64_t margin_ns(const CycleSample& sample) const;
 
   RunOptions options_;
@@ -157,7 +163,7 @@ class MainRunner {
   FreeRunningTime start_;
   FreeRunningTime next_line_;
   std::uint64_t asked_at_ = 0;  ///< cycle in which OP was asked for
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> csv_{nullptr, std::fclose};
+  CycleCsv csv_;
 };
 
 [[nodiscard]] const char* name(CycleState state);
