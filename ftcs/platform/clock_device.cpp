@@ -82,7 +82,7 @@ Result<ClockDevice, OsError> ClockDevice::open_system(Kernel& kernel, ClockAcces
   device.limits_ = RateLimits::symmetric_ppb(kLargestSystemPpm * 1e3);
   if (access == ClockAccess::kSteer) {
     if (auto error = device.probe_rights()) return std::move(*error);
-    if (auto error = device.hold("ftcs clock realtime")) return std::move(*error);
+    if (auto error = device.hold()) return std::move(*error);
   }
   return device;
 }
@@ -109,9 +109,7 @@ Result<ClockDevice, OsError> ClockDevice::open_phc(Kernel& kernel, const std::st
     if (capabilities.max_adj <= 0) {
       return OsError{OsErrorKind::kSystem, EOPNOTSUPP, path + " (its frequency is fixed)"};
     }
-    if (auto error = device.hold("ftcs clock " + path.substr(path.rfind('/') + 1))) {
-      return std::move(*error);
-    }
+    if (auto error = device.hold()) return std::move(*error);
   }
   return device;
 }
@@ -132,12 +130,23 @@ Result<ClockDevice, OsError> ClockDevice::open_phc_of(Kernel& kernel, const std:
   return open_phc(kernel, "/dev/ptp" + std::to_string(capabilities->phc_index), access);
 }
 
-// Two servos on one clock would fight. Where names cannot be held (a simulator without UNIX
-// sockets) the check is left out.
-std::optional<OsError> ClockDevice::hold(const std::string& key) {
-  const int fd = kernel_->hold_name(key.c_str());
-  if (fd == -EADDRINUSE) return os_error(EADDRINUSE, name_);
-  if (fd >= 0) hold_ = Descriptor(*kernel_, fd);
+// Two servos on one clock would fight. A hardware clock is taken as the device that it is. The
+// system clock has none: a name, and a file that other network namespaces see too. Where names
+// cannot be held (a simulator without UNIX sockets) its clock is not this machine's.
+std::optional<OsError> ClockDevice::hold() {
+  if (!is_system()) {
+    if (kernel_->lock(device_.get()) == -EWOULDBLOCK) return os_error(EADDRINUSE, name_);
+    return std::nullopt;
+  }
+  const int held = kernel_->hold_name("ftcs clock realtime");
+  if (held == -EADDRINUSE) return os_error(EADDRINUSE, name_);
+  if (held < 0) return std::nullopt;
+  hold_ = Descriptor(*kernel_, held);
+  const int file =
+      kernel_->open("/run/ftcs-clock-realtime.lock", O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW);
+  if (file < 0) return std::nullopt;
+  device_ = Descriptor(*kernel_, file);
+  if (kernel_->lock(file) == -EWOULDBLOCK) return os_error(EADDRINUSE, name_);
   return std::nullopt;
 }
 

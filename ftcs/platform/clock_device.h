@@ -22,7 +22,8 @@ class ClockDevice {
   /// CLOCK_REALTIME. kSteer: refused without the right to set it, and while another program of ours
   /// steers it. Nothing is touched.
   [[nodiscard]] static Result<ClockDevice, OsError> open_system(Kernel& kernel, ClockAccess access);
-  /// "/dev/ptp0". kSteer: opened for writing, exclusively among our programs.
+  /// "/dev/ptp0". kSteer: opened for writing, exclusively among our programs, whatever name they
+  /// call it by.
   [[nodiscard]] static Result<ClockDevice, OsError> open_phc(Kernel& kernel,
                                                              const std::string& path,
                                                              ClockAccess access);
@@ -64,14 +65,14 @@ class ClockDevice {
   ClockDevice(Kernel& kernel, std::string name, clockid_t id)
       : kernel_(&kernel), name_(std::move(name)), id_(id) {}
 
-  [[nodiscard]] std::optional<OsError> hold(const std::string& key);
+  [[nodiscard]] std::optional<OsError> hold();
   [[nodiscard]] std::optional<OsError> probe_rights();
   [[nodiscard]] std::optional<ClockError> failed(int result) noexcept;
 
   Kernel* kernel_;
   std::string name_;
   clockid_t id_;
-  Descriptor device_{};
+  Descriptor device_{};  // of CLOCK_REALTIME: the lock file
   Descriptor hold_{};
   RateLimits limits_{};
   int error_number_ = 0;

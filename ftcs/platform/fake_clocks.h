@@ -48,8 +48,9 @@ class FakeClocks final : public FakeKernel {
   int basic_errno = 0;
   bool phc_gone = false;
   bool short_cross_reads = false;
-  std::set<std::string> held_names;
-  int commands = 0;  ///< adjust_clock() calls that asked for a change and got it
+  bool run_folder_is_writable = true;
+  std::set<std::string> held_names;  ///< and locked descriptors; for good
+  int commands = 0;                  ///< adjust_clock() calls that asked for a change and got it
   std::int64_t timer_ns = 0;
 
   FakeClocks() { reading_ns = 20; }
@@ -76,11 +77,15 @@ class FakeClocks final : public FakeKernel {
     return now;
   }
   int open(const char* path, int) noexcept override {
-    if (std::string(path) != "/dev/ptp0") return -ENOENT;
+    if (run_folder_is_writable && std::string(path).starts_with("/run/")) return kLockDescriptor;
+    if (std::string(path) != "/dev/ptp0" && std::string(path) != "/dev/ptp_nic") return -ENOENT;
     return phc_open_errno != 0 ? -phc_open_errno : kPhcDescriptor;
   }
   int hold_name(const char* name) noexcept override {
     return held_names.insert(name).second ? 900 : -EADDRINUSE;
+  }
+  int lock(int fd) noexcept override {
+    return held_names.insert("descriptor " + std::to_string(fd)).second ? 0 : -EWOULDBLOCK;
   }
   int set_timer(int, std::int64_t ns) noexcept override {
     timer_ns = ns;
@@ -129,7 +134,8 @@ class FakeClocks final : public FakeKernel {
     }
   }
 
-  static constexpr int kPhcDescriptor = 800;
+  static constexpr int kPhcDescriptor = 800;  ///< /dev/ptp0, and /dev/ptp_nic, a link to it
+  static constexpr int kLockDescriptor = 801;
 
  private:
   static ptp_clock_time time_of(const Clock& clock) {

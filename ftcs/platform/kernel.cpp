@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/timerfd.h>
 #include <sys/un.h>
@@ -61,7 +62,8 @@ int LinuxKernel::control(int fd, unsigned long request, void* argument) noexcept
 }
 
 int LinuxKernel::open(const char* path, int flags) noexcept {
-  return or_errno(::open(path, flags));
+  constexpr mode_t kOwner = 0600;  // of what O_CREAT makes
+  return or_errno(::open(path, flags, kOwner));
 }
 
 int LinuxKernel::poll(std::span<pollfd> descriptors, int timeout_ms) noexcept {
@@ -103,6 +105,8 @@ int LinuxKernel::hold_name(const char* name) noexcept {
   close(fd);
   return bound;
 }
+
+int LinuxKernel::lock(int fd) noexcept { return or_errno(::flock(fd, LOCK_EX | LOCK_NB)); }
 
 Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
   if (this != &other) {

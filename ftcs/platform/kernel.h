@@ -13,7 +13,9 @@
 
 namespace ftcs::platform {
 
-/// Every system call that this layer makes, so that a test can let each of them fail.
+/// The system calls behind clocks, timestamps and the network, so that a test can let each of them
+/// fail. Management sockets, processes and files of ours (local_socket.h, child_process.h,
+/// durable_file.h) call the system themselves and are tested with the real one.
 ///
 /// A negative result is -errno. The set is kept to what a network simulator that replaces libc's
 /// calls offers too: poll, plain datagram sockets, ioctl; no threads, netlink, epoll or signalfd.
@@ -47,6 +49,9 @@ class Kernel {
   /// A name that one process of this host (network namespace) can hold, until the descriptor is
   /// closed or the process ends. -EADDRINUSE: somebody does.
   [[nodiscard]] virtual int hold_name(const char* name) noexcept = 0;
+  /// Takes what is open there, file or device, for this process, until the descriptor is closed.
+  /// -EWOULDBLOCK: another one has it, under whatever name it was opened.
+  [[nodiscard]] virtual int lock(int fd) noexcept = 0;
 
  protected:
   Kernel() = default;
@@ -75,6 +80,7 @@ class LinuxKernel final : public Kernel {
   [[nodiscard]] int open_timer() noexcept override;
   [[nodiscard]] int set_timer(int fd, std::int64_t from_now_ns) noexcept override;
   [[nodiscard]] int hold_name(const char* name) noexcept override;
+  [[nodiscard]] int lock(int fd) noexcept override;
 };
 
 /// Owns a file descriptor.

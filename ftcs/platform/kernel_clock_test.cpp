@@ -3,6 +3,10 @@
 // clock on its own, 40 ppm fast; reading the latter takes 0.8 us over the bus.
 #include "ftcs/platform/kernel_clock.h"
 
+#include <cstdlib>
+#include <fcntl.h>
+#include <filesystem>
+
 #include <gtest/gtest.h>
 
 #include "ftcs/platform/fake_clocks.h"
@@ -344,6 +348,46 @@ TEST(ClockDevice, the_second_program_on_a_clock_is_refused) {
   }
   EXPECT_TRUE(ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kRead).ok());
   EXPECT_EQ(kernel.commands, 0);
+}
+
+TEST(ClockDevice, another_name_is_no_other_clock) {
+  FakeClocks kernel;
+  const auto first = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kSteer);
+  ASSERT_TRUE(first.ok());
+  const auto link = ClockDevice::open_phc(kernel, "/dev/ptp_nic", ClockAccess::kSteer);
+  ASSERT_FALSE(link.ok());
+  EXPECT_EQ(link.error().message(), "/dev/ptp_nic: already in use by another program");
+}
+
+TEST(ClockDevice, the_system_clock_is_one_in_all_network_namespaces) {
+  for (const bool file : {true, false}) {
+    FakeClocks kernel;
+    kernel.run_folder_is_writable = file;
+    const auto first = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+    ASSERT_TRUE(first.ok());
+    kernel.held_names.erase("ftcs clock realtime");  // as seen from another network namespace
+    EXPECT_EQ(ClockDevice::open_system(kernel, ClockAccess::kSteer).ok(), !file);
+  }
+}
+
+TEST(ClockDevice, a_file_is_locked_whatever_it_is_called) {
+  LinuxKernel kernel;
+  std::string folder = (std::filesystem::temp_directory_path() / "ftcs-lock-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const std::string file = folder + "/ptp0";
+  const std::string link = folder + "/ptp_nic";
+  Descriptor made(kernel, kernel.open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC));
+  ASSERT_TRUE(made.is_open());
+  std::filesystem::create_symlink(file, link);
+  EXPECT_EQ(kernel.lock(made.get()), 0);
+  {
+    const Descriptor other(kernel, kernel.open(link.c_str(), O_RDWR));
+    EXPECT_EQ(kernel.lock(other.get()), -EWOULDBLOCK);
+  }
+  made.reset();
+  const Descriptor again(kernel, kernel.open(link.c_str(), O_RDWR));
+  EXPECT_EQ(kernel.lock(again.get()), 0) << "free again once it is closed";
+  std::filesystem::remove_all(folder);
 }
 
 TEST(ClockDevice, a_name_of_this_host_is_held_by_one_process) {
