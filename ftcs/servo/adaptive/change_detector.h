@@ -46,10 +46,12 @@ class ChangeDetector {
     return overtaken;
   }
 
-  /// The model that overtakes calm model i after `count` messages, or kNone. Clears its sums.
-  [[nodiscard]] std::size_t take_over(std::size_t i, double count) noexcept {
+  /// The model that overtakes calm model i after `count` messages, the last of which had
+  /// `log_density`, or kNone. Clears its sums.
+  [[nodiscard]] std::size_t take_over(std::size_t i, double count,
+                                      const std::array<double, kSize>& log_density) noexcept {
     // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
-    const auto calm_threshold = static_cast<float>(kThreshold * (1.0 + 16.0 / count));
+    const double caution = 1.0 + 16.0 / count;
     std::size_t winner = kNone;
     float furthest = 0.0F;
     for (std::size_t j = i + 1; j < kSize; ++j) {
@@ -61,6 +63,9 @@ class ChangeDetector {
     }
     if (winner == kNone) return kNone;
     // If a jump leads that is not yet certain, a calmer model must not act in its place: wait.
+    const bool abrupt = log_density[winner] - log_density[i] > kAbrupt;
+    const auto calm_threshold = static_cast<float>(
+        abrupt ? kThreshold * caution : std::max(kThreshold * caution, kGradual));
     if (sums_[i][winner] <= (winner < kCalm ? calm_threshold : kJumpThreshold)) return kNone;
     sums_[i].fill(0.0F);
     return winner;
@@ -71,6 +76,10 @@ class ChangeDetector {
  private:
   /// Nats. 11: one false alarm per e^11 = 60,000 messages and pair of models at most (Wald).
   static constexpr double kThreshold = 11.0;
+  /// What one message brings a good part of is a change, and must be followed at once; what
+  /// has gathered over many is more often chance, and costs a calm model all that it knew.
+  static constexpr double kAbrupt = 5.0;
+  static constexpr double kGradual = 13.0;
   /// Jumps explain everything for a while; they must be far ahead.
   static constexpr float kJumpThreshold = 30.0F;
   /// Jumps and the wildest frequency model explain anything: Occam's factor against them, nats.

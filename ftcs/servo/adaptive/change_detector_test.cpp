@@ -18,13 +18,26 @@ TEST(ChangeDetector, a_wilder_model_that_explains_more_takes_over) {
   Detector detector;
   Densities l{};
   l[20] = 4.0;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     detector.add(l);
-    EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+    EXPECT_EQ(detector.take_over(5, kLater, l), Detector::kNone);
   }
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater), 20U);
-  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone) << "sums start anew";
+  EXPECT_EQ(detector.take_over(5, kLater, l), 20U);
+  EXPECT_EQ(detector.take_over(5, kLater, l), Detector::kNone) << "sums start anew";
+}
+
+TEST(ChangeDetector, one_message_that_says_most_decides_sooner_than_many) {
+  Detector detector;
+  Densities l{};
+  l[20] = 2.5;
+  detector.add(l);
+  l[20] = 9.5;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater, l), 20U) << "12 nats, 9.5 of them at once";
+  l[20] = 4.0;
+  for (int i = 0; i < 3; ++i) detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater, l), Detector::kNone) << "12 nats by and by";
 }
 
 TEST(ChangeDetector, a_calmer_model_never_takes_over) {
@@ -32,7 +45,7 @@ TEST(ChangeDetector, a_calmer_model_never_takes_over) {
   Densities l{};
   l[2] = 50.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l), Detector::kNone);
 }
 
 TEST(ChangeDetector, a_jump_that_leads_but_is_not_certain_holds_the_others_back) {
@@ -41,11 +54,11 @@ TEST(ChangeDetector, a_jump_that_leads_but_is_not_certain_holds_the_others_back)
   l[20] = 13.0;
   l[30] = 25.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l), Detector::kNone);
   l[20] = 0.0;
   l[30] = 10.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater), 30U);
+  EXPECT_EQ(detector.take_over(5, kLater, l), 30U);
 }
 
 TEST(ChangeDetector, evidence_must_come_in_a_row) {
@@ -57,7 +70,7 @@ TEST(ChangeDetector, evidence_must_come_in_a_row) {
   for (int i = 0; i < 100; ++i) {
     detector.add(good);
     detector.add(bad);
-    ASSERT_EQ(detector.take_over(5, kLater), Detector::kNone);
+    ASSERT_EQ(detector.take_over(5, kLater, bad), Detector::kNone);
   }
 }
 
@@ -66,8 +79,8 @@ TEST(ChangeDetector, early_on_it_asks_for_more) {
   Densities l{};
   l[20] = 20.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, 8.0), Detector::kNone);
-  EXPECT_EQ(detector.take_over(5, kLater), 20U);
+  EXPECT_EQ(detector.take_over(5, 8.0, l), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l), 20U);
 }
 
 /// Two models with the same mean and variances 1 and 1.2, data from the first: exp(11) messages
@@ -83,7 +96,7 @@ TEST(ChangeDetector, false_alarms_are_rare) {
     l.fill(-0.5 * n * n);
     l[20] = -0.5 * n * n / 1.2 - 0.5 * 0.1823;
     detector.add(l);
-    if (detector.take_over(0, kLater) != Detector::kNone) ++alarms;
+    if (detector.take_over(0, kLater, l) != Detector::kNone) ++alarms;
   }
   EXPECT_LE(alarms, 2);
 }

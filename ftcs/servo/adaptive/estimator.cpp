@@ -237,7 +237,7 @@ void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
   // From calm to wild: every source stands behind its target and still has its own state.
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
-    const std::size_t source = detector_.take_over(i, static_cast<double>(count_));
+    const std::size_t source = detector_.take_over(i, static_cast<double>(count_), log_density);
     if (source == ChangeDetector<Grid>::kNone) continue;
     bank_.set(i, bank_.estimate(source));
     if (i != best_) continue;
@@ -319,7 +319,7 @@ void Estimator<Grid>::follow_scale() noexcept {
   scale_ = robust_scale_;
   if (!mature) return;
   const double wanted = std::pow(learnt / assumed, 0.5 / sides);
-  scale_ = std::clamp(wanted, 0.6 * robust_scale_, 1.8 * robust_scale_);
+  scale_ = std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_);
 }
 
 /// Brings the learnt shapes into use. When a tail appears or goes, the zero of the delay moves from

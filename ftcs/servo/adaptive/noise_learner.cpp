@@ -12,8 +12,9 @@ constexpr double kMemory = 1000.0;
 /// A sample further from the median than this is an outlier for the purpose of learning, whatever
 /// the gate thinks: the gate's own judgement must not decide what noise looks like.
 constexpr double kAcceptSigmas = 12.0;
-/// Variance above this times the robust one: the moments belong to the past.
-constexpr double kStaleRatio = 9.0;
+/// Variance above this times the robust one: the moments belong to the past. A third of the
+/// deviation (9) happens by chance to a window of 32 once in half a million messages.
+constexpr double kStaleRatio = 16.0;
 constexpr double kSquareLimit = 60.0;
 /// Moments worth standardising by.
 constexpr double kShapeSamples = 16.0;

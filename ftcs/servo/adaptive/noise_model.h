@@ -34,7 +34,8 @@ struct FullGrid {
   static constexpr std::size_t kOpinionWindow = 16;   ///< messages of the second opinion
   static constexpr std::size_t kSize = 32;
   static constexpr std::size_t kJumps = 3;
-  static constexpr std::size_t kStart = 13;  ///< the model that is believed before any evidence
+  static constexpr std::size_t kStart = 13;    ///< the model that is believed before any evidence
+  static constexpr std::size_t kFavoured = 7;  ///< believed a little more than its neighbours
   static constexpr std::array<NoiseModel, kSize> kModels = {{
       {0.0, 0.0, 0.0},   {0.0, 1e-14, 0.0},  {0.0, 1e-13, 0.0}, {0.0, 1e-12, 0.0},
       {0.0, 1e-11, 0.0}, {0.0, 1e-10, 0.0},  {1e-5, 0.0, 0.0},  {0.0, 1e-9, 0.0},
@@ -56,6 +57,7 @@ struct SmallGrid {
   static constexpr std::size_t kSize = 3;
   static constexpr std::size_t kJumps = 0;
   static constexpr std::size_t kStart = 1;
+  static constexpr std::size_t kFavoured = kSize;  // none
   static constexpr std::array<NoiseModel, kSize> kModels = {{
       {0.0, 1e-9, 0.0},
       {0.0, 1e-4, 0.0},
