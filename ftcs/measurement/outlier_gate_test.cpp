@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/measurement/outlier_gate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -45,6 +47,26 @@ TEST(OutlierGate, first_innovation_after_the_warm_up_can_be_rejected) {
   OutlierGate gate{{.warm_up = 3}};
   for (int i = 0; i < 3; ++i) EXPECT_EQ(decide(gate, 1.0), GateDecision::kAccept);
   EXPECT_EQ(decide(gate, 1e6), GateDecision::kReject);
+}
+
+TEST(OutlierGate, its_spread_is_that_of_the_sorted_innovations) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 2000; ++round) {
+    OutlierGate gate;
+    const std::size_t size = 1 + random() % OutlierGate::kMemory;
+    std::vector<double> values(size);
+    for (double& value : values) {
+      value = static_cast<double>(random() % 7);  // many alike
+      gate.observe(Duration::from_ns(value));
+    }
+    const auto middle = [](std::vector<double> of) {
+      std::sort(of.begin(), of.end());
+      return of[of.size() / 2];
+    };
+    const double centre = middle(values);
+    for (double& value : values) value = std::abs(value - centre);
+    ASSERT_EQ(gate.spread_ns(), std::max(1.4826 * middle(values), 1.0)) << "round " << round;
+  }
 }
 
 TEST(OutlierGate, learns_from_what_it_is_only_shown) {
