@@ -192,10 +192,10 @@ int MonitorReceiver::finish() {
   log()(
       LogLevel::kNotice,
       "reports: {} Syncs, {} delays; {} malformed, {} unknown TLVs, {} missed Syncs, {} repeated, "
-      "{} restarts, {} transmitter changes, {} reference jumps, {} steps of CLOCK_REALTIME",
+      "{} restarts, {} transmitter changes, {} reference jumps, {} steps of the clock by others",
       counters.syncs, counters.delays, counters.malformed, counters.unknown_tlvs,
       counters.missed_syncs, counters.repeated, counters.restarts, counters.transmitter_changes,
-      counters.reference_jumps, timestamps().realtime_steps());
+      counters.reference_jumps, timestamps().foreign_steps());
   return follower_.locked() ? kSuccess : kNotLocked;
 }
 

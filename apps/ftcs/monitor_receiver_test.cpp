@@ -53,10 +53,10 @@ class MonitorReceiverTest : public testing::Test {
     auto clocks = open_ptp_clocks(kernel, options, log);
     EXPECT_TRUE(clocks.ok()) << clocks.error();
     PortFacts facts;
-    real = clocks->real.get();
     const int code = MonitorReceiver(kernel, options, log, std::move(clocks->timestamps), facts,
                                      clocks->real.get())
                          .run();
+    foreign_steps = clocks->real->clock().foreign_steps();
     return code;
   }
   /// Of CLOCK_REALTIME against UTC.
@@ -91,7 +91,7 @@ class MonitorReceiverTest : public testing::Test {
   PtpOptions options;
   std::filesystem::path folder;
   std::optional<LocalSocket> ptp4l;
-  RealClock* real = nullptr;
+  std::uint64_t foreign_steps = 0;
   std::function<void()> on_turn;
   std::uint16_t sequence = 0;
   double next_report_ns = 0.0;
@@ -163,6 +163,7 @@ TEST_F(MonitorReceiverTest, a_step_by_somebody_else_is_counted_and_followed) {
   };
   EXPECT_EQ(run(), kSuccess);
   EXPECT_TRUE(stepped);
+  EXPECT_EQ(foreign_steps, 1U);
   EXPECT_NEAR(error(), 0.0, 200.0);
 }
 

@@ -156,7 +156,7 @@ void PtpPort::log_unusual(const ptp::Counters& counters) {
     add("transmit_stamp_late", socket->counters().transmit_stamp_late);
     add("oversized_datagrams", socket->counters().oversized);
   }
-  add("realtime_steps", timestamps_->realtime_steps());
+  add("foreign_steps", timestamps_->foreign_steps());
   if (!text.empty()) log_(LogLevel::kNotice, "counted besides: {}", text);
 }
 

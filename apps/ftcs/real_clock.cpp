@@ -94,8 +94,19 @@ std::optional<std::string> RealClock::attend(bool steering, bool locked,
     follow_leap(steering);
     follow_scale();
     if (steering) publish(locked, servo);
+    if (locked) warn_of_expired_list();  // before, the clock may show anything
   }
   return std::nullopt;
+}
+
+void RealClock::warn_of_expired_list() {
+  if (expiry_said_ || !utc_.leap_seconds || !utc_.leap_seconds->expires()) return;
+  if (kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond <= *utc_.leap_seconds->expires()) return;
+  expiry_said_ = true;
+  log_(LogLevel::kWarning,
+       "{}: the leap second list has expired: a leap second or an offset that only the list would "
+       "tell may be missed; install a newer one",
+       name());
 }
 
 void RealClock::report_foreign() {

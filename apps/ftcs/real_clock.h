@@ -64,6 +64,7 @@ class RealClock {
 
  private:
   void report_foreign();
+  void warn_of_expired_list();
   void follow_scale();
   [[nodiscard]] int utc_offset_at(std::int64_t utc_s) const;
   void follow_leap(bool steering);
@@ -86,6 +87,7 @@ class RealClock {
   int last_leap_ = 0;                  ///< the one that no_leap_before_s_ belongs to
   std::int64_t attended_raw_s_ = -1;
   bool publish_failed_ = false;
+  bool expiry_said_ = false;
 };
 
 /// "CLOCK_REALTIME: not permitted", for a log line.

@@ -166,6 +166,35 @@ TEST_F(RealClockTest, the_kernel_is_told_only_once_the_clock_is_steered) {
   EXPECT_EQ(kernel.system.status, STA_UNSYNC);
 }
 
+TEST_F(RealClockTest, an_expired_leap_second_list_is_said_once) {
+  for (const std::int64_t days_left : {2, -2}) {
+    kernel.held_names.clear();
+    std::FILE* const lines = std::tmpfile();
+    ASSERT_NE(lines, nullptr);
+    Log noted(kernel, lines, 4);
+    constexpr std::int64_t kFrom1900 = 2'208'988'800;
+    auto list = LeapSeconds::parse(
+        fmt::format("#@ {}\n3692217600 37\n", kNewYear2024 + kFrom1900 + days_left * 86'400),
+        "list");
+    ASSERT_TRUE(list.ok());
+    kernel.system.time_ns = static_cast<double>(kNewYear2024 * 1'000'000'000 - FakeClocks::kEpoch);
+    auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+    RealClock clock(kernel, noted, KernelClock(std::move(*device)), {.leap_seconds = *list});
+    for (int i = 0; i < 10; ++i) {
+      kernel.run(kSecond);
+      EXPECT_FALSE(clock.attend(true, i > 4, {}).has_value());
+    }
+    clock.stop();
+    std::rewind(lines);
+    int warnings = 0;
+    for (char line[256]; std::fgets(line, sizeof line, lines) != nullptr;) {
+      warnings += std::string(line).find("list has expired") != std::string::npos ? 1 : 0;
+    }
+    std::fclose(lines);
+    EXPECT_EQ(warnings, days_left < 0 ? 1 : 0);
+  }
+}
+
 TEST_F(RealClockTest, a_device_that_is_gone_ends_the_run) {
   auto device = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kSteer);
   RealClock phc(kernel, log, KernelClock(std::move(*device)), {});

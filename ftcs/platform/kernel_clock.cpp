@@ -112,6 +112,7 @@ void KernelClock::note_leap_or_step(Duration deviation, const ClockDevice::Readi
     return;
   }
   history_.steer(instant, history_.rate_at(instant), deviation);
+  ++foreign_steps_;
   foreign_.step = foreign_.step.value_or(Duration{}) + deviation;
   trusted_since_ns_ = now.clock_ns;
   gain_deviation_ = {};

@@ -68,6 +68,8 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   /// Asks the kernel whether its frequency is still ours, and reports that and everything else
   /// once.
   [[nodiscard]] ForeignSteering take_foreign_steering() noexcept;
+  /// How often somebody else has stepped the clock.
+  [[nodiscard]] std::uint64_t foreign_steps() const noexcept { return foreign_steps_; }
   /// Set for good once the device is gone.
   [[nodiscard]] std::optional<ClockError> failure() const noexcept { return failure_; }
   [[nodiscard]] ClockDevice& device() noexcept { return device_; }
@@ -109,6 +111,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   std::int64_t gain_elapsed_ns_ = 0;
   int expected_leap_ = 0;
   ForeignSteering foreign_{};
+  std::uint64_t foreign_steps_ = 0;
   std::optional<ClockError> failure_{};
 };
 

@@ -274,6 +274,7 @@ TEST_P(KernelClockTest, survives_a_step_by_somebody_else) {
     const ForeignSteering foreign = clock.take_foreign_steering();
     ASSERT_TRUE(foreign.step.has_value());
     EXPECT_NEAR(foreign.step->ns(), leap_ns, 20'000.0);
+    EXPECT_EQ(clock.foreign_steps(), 1U);
     kernel.run(kMillisecond);
     const auto stamp = clock.from_stamp(FakeClocks::kEpoch + std::llround(truth().time_ns));
     ASSERT_TRUE(stamp.has_value());

@@ -33,7 +33,9 @@ const sockaddr* generic(const sockaddr_un& address) {
 }
 
 OsError path_error(int number, const std::string& path) {
-  return os_error(number, "socket " + path);
+  // Files know permissions alone; what else is known of errors is about networks and clocks.
+  const bool in_use = number == EADDRINUSE;
+  return {in_use ? OsErrorKind::kAddressInUse : OsErrorKind::kSystem, number, "socket " + path};
 }
 
 /// A datagram socket, or -errno. Not SOCK_NONBLOCK: network simulators know plain types only.

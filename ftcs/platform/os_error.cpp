@@ -41,7 +41,7 @@ const char* reason(const OsError& error) {
     case OsErrorKind::kBadAddress:
       return "not an IPv4 address";
     case OsErrorKind::kNotPermitted:
-      return "not permitted (run as root, grant the capability, or use a port above 1023)";
+      return "not permitted (run as root or grant the capability)";
     case OsErrorKind::kAddressInUse:
       return "already in use by another program";
     case OsErrorKind::kTimestampingUnsupported:

@@ -118,7 +118,10 @@ std::optional<OsError> open_udp(Kernel& kernel, int fd, const PtpEndpointConfig&
   const std::uint16_t port = port_of(config, channel);
   const int result = kernel.bind(
       fd, ipv6 ? SocketAddress::ipv6(in6addr_any, port, 0) : SocketAddress::ipv4({}, port));
-  if (result < 0) return os_error(-result, "UDP port " + std::to_string(port));
+  if (result < 0) {
+    const bool low = port < IPPORT_RESERVED && (result == -EACCES || result == -EPERM);
+    return os_error(-result, "UDP port " + std::to_string(port) + (low ? " (below 1024)" : ""));
+  }
   if (config.unicast) return std::nullopt;
   return ipv6 ? join_ipv6(kernel, fd, config, interface) : join_ipv4(kernel, fd, config, interface);
 }

@@ -73,7 +73,10 @@ class TimestampClock {
   [[nodiscard]] Stamp user_space_stamp() noexcept {
     return {source().now(), StampSource::kUserSpace};
   }
-  [[nodiscard]] std::uint64_t realtime_steps() const noexcept { return realtime_.steps(); }
+  /// Of the clock that the stamps are readings of, by somebody else; as far as was seen.
+  [[nodiscard]] std::uint64_t foreign_steps() const noexcept {
+    return steered_ != nullptr ? steered_->foreign_steps() : realtime_.steps();
+  }
 
  private:
   Kernel& kernel_;

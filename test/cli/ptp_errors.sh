@@ -156,7 +156,7 @@ if [ "$(id -u)" -eq 0 ] && [ "$privileged" -gt 320 ] && command -v setpriv > /de
   timeout 20 setpriv --reuid=65534 --clear-groups --bounding-set=-all --inh-caps=-all \
     "$folder/ftcs" ptp -i lo > "$folder/out" 2> "$folder/err"
   code=$?
-  if [ "$code" -ne 1 ] || ! grep -q "UDP port 319: not permitted" "$folder/err"; then
+  if [ "$code" -ne 1 ] || ! grep -qF "UDP port 319 (below 1024): not permitted" "$folder/err"; then
     echo "FAILED: port 319 as nobody: exit code $code:"
     cat "$folder/err"
     failures=$((failures + 1))
