@@ -89,10 +89,10 @@ def stands_still(seen, missed):
     for number, window in enumerate(seen):
         gone = window in missed
         row = row + 1 if gone else 0
-        counter = counter + 3 if gone else max(counter - 1, 0)
+        counter = min(counter + 3, 3 * SYNC_ERROR_LIMIT) if gone else max(counter - 1, 0)
         highest, longest = max(highest, counter), max(longest, row)
         if counter > SYNC_ERROR_LIMIT:
-            last, counter = number, 0
+            last = number
     return highest, longest, last
 
 
