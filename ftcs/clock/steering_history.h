@@ -26,9 +26,11 @@ class SteeringHistory {
   explicit SteeringHistory(const Map& first) noexcept : segments_(Segment{first}) {}
 
   /// From `instant` on the clock runs at `rate`, after a jump by `step`. What was planned for later
-  /// is dropped.
-  void steer(FreeRunningTime instant, Rate rate, Duration step = {}) noexcept {
-    segments_.append(Segment{segments_.at(instant).map.continued(instant, rate).stepped(step)});
+  /// is dropped. Returns what the clock shows at `instant`, after the jump.
+  LocalTime steer(FreeRunningTime instant, Rate rate, Duration step = {}) noexcept {
+    const Segment next{segments_.at(instant).map.continued(instant, rate).stepped(step)};
+    segments_.append(next);
+    return next.map.to_base();
   }
 
   /// What was measured says that the segment now in force lies elsewhere (a kernel's clock is known

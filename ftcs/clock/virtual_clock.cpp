@@ -27,13 +27,11 @@ Result<ClockReading, ClockError> VirtualClock::apply(const ServoCommand& command
 Result<ClockReading, ClockError> VirtualClock::apply_at(FreeRunningTime instant,
                                                         const ServoCommand& command) noexcept {
   if (const auto error = find_error(command, limits_)) return *error;
-  if (has_correction(command)) {
-    history_.steer(instant, command.correction_rate, command.step);
-    history_.steer(instant + correction_length(command), command.tracking_rate);
-  } else {
-    history_.steer(instant, command.tracking_rate, command.step);
-  }
-  return ClockReading{instant, local_at(instant)};
+  const bool corrects = has_correction(command);
+  const Rate first = corrects ? command.correction_rate : command.tracking_rate;
+  const LocalTime local = history_.steer(instant, first, command.step);
+  if (corrects) history_.steer(instant + correction_length(command), command.tracking_rate);
+  return ClockReading{instant, local};
 }
 
 }  // namespace ftcs

@@ -59,7 +59,8 @@ class Chain {
   void look(TrueTime t) {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       Node& node = *nodes_[i];
-      const Rate tracking = node.discipline.latest().tracking_rate * node.oscillator.rate_at(t);
+      const Rate tracking =
+          node.discipline.latest().tracking_rate * node.oscillator.state_at(t).rate;
       observer_.on_truth({i, cycle(t), t.since_epoch().seconds(), time_error_ns(i, t),
                           tracking.ppb(), &node.discipline.latest()});
     }

@@ -52,14 +52,13 @@ void run_one_way(const OneWaySpec& spec, std::uint64_t seed, Law& law, Observer&
 
   TrueTime now{};
   for (std::uint64_t index = 0; index < spec.samples; ++index, now = now + spec.interval) {
-    const FreeRunningTime reading = oscillator.reading_at(now);
+    const auto [reading, rate] = oscillator.state_at(now);
     source.set(reading);
     const ClockReading truth{reading, clock.local_at(reading)};
     const ReferenceTime reference{now.since_epoch()};
     // The noise is a length of true time (it stands for delay), so the oscillator stretches it.
     const double noise_ns = spec.timestamp_noise_ns * noise.normal();
-    const FreeRunningTime stamp =
-        quantise(reading + Duration::from_ns(noise_ns * oscillator.rate_at(now).ratio()));
+    const FreeRunningTime stamp = quantise(reading + Duration::from_ns(noise_ns * rate.ratio()));
     const SyncSample sample{reference, Duration{}, clock.local_at(stamp), stamp};
     const ServoUpdate update = law.update(sample, truth);
     OneWaySample seen{index, sample.offset().ns(),

@@ -16,7 +16,7 @@ Oscillator::Oscillator(OscillatorSpec spec, std::uint64_t seed, std::uint64_t in
 void Oscillator::extend() {
   const double deviation = source_.next(end_.since_epoch().seconds(), grid_.seconds());
   const Segment segment{end_, end_reading_, Rate::from_ratio(1.0 + deviation)};
-  segments_[cells_ % segments_.size()] = segment;
+  segments_[cells_ % kMemory] = segment;
   ++cells_;
   end_ = end_ + grid_;
   end_reading_ = segment.at(end_);
@@ -29,7 +29,7 @@ const Oscillator::Segment& Oscillator::segment_at(TrueTime t) {
   return recall(cell);
 }
 
-FreeRunningTime Oscillator::reading_at(TrueTime t) { return segment_at(t).at(t); }
+FreeRunningTime Oscillator::reading_at(TrueTime t) { return state_at(t).reading; }
 
 TrueTime Oscillator::true_at(FreeRunningTime reading) {
   while (reading >= end_reading_) extend();

@@ -31,8 +31,15 @@ class Oscillator {
 
   [[nodiscard]] FreeRunningTime reading_at(TrueTime t);
   [[nodiscard]] TrueTime true_at(FreeRunningTime reading);
-  /// 1 + y at that instant.
-  [[nodiscard]] Rate rate_at(TrueTime t) { return segment_at(t).rate; }
+  /// What it shows and 1 + y at that instant.
+  struct State {
+    FreeRunningTime reading;
+    Rate rate;
+  };
+  [[nodiscard]] State state_at(TrueTime t) {
+    const Segment& segment = segment_at(t);
+    return {segment.at(t), segment.rate};
+  }
 
  private:
   static constexpr std::size_t kMemory = 1024;
@@ -49,10 +56,10 @@ class Oscillator {
   [[nodiscard]] const Segment& segment_at(TrueTime t);
   void extend();
   [[nodiscard]] const Segment& recall(std::uint64_t cell) const noexcept {
-    return segments_[cell % segments_.size()];
+    return segments_[cell % kMemory];
   }
   [[nodiscard]] std::uint64_t oldest() const noexcept {
-    return cells_ > segments_.size() ? cells_ - segments_.size() : 0;
+    return cells_ > kMemory ? cells_ - kMemory : 0;
   }
 
   FrequencySource source_;
