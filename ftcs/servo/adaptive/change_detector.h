@@ -29,18 +29,26 @@ class ChangeDetector {
       l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
     }
     std::uint32_t overtaken = 0;
+    const Quad calm_needed = Quad{} + static_cast<float>(kThreshold);
     for (std::size_t i = 0; i < kCalm; ++i) {
       const float own = l[i];
-      std::size_t j = (i + 1) / kFour * kFour;
-      Quad behind = load<Quad>(&kBehind[kFour - 1 - i % kFour]);  // nothing of calmer models
-      if (j > i) behind = Quad{};
-      auto alarm = Quad{} > Quad{};
-      for (; j < kWidth; j += kFour, behind = Quad{}) {
+      const auto advance = [this, &l, own, i](std::size_t j, const Quad& behind) {
         const Quad sum =
             larger<Quad>(Quad{}, load<Quad>(&sums_[i][j]) + (load<Quad>(&l[j]) + behind - own));
         store(&sums_[i][j], sum);
-        alarm |= sum > load<Quad>(&kNeeded[j]);
+        return sum;
+      };
+      std::size_t j = (i + 1) / kFour * kFour;
+      // Nothing of calmer models in the group of four where the wilder ones begin.
+      Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
+      Quad peak{};
+      if (j < kLast) {
+        peak = advance(j, behind);
+        behind = Quad{};
+        for (j += kFour; j < kLast; j += kFour) peak = larger<Quad>(peak, advance(j, behind));
       }
+      const auto alarm =
+          (advance(kLast, behind) > load<Quad>(kNeeded.data())) | (peak > calm_needed);
       overtaken |= static_cast<std::uint32_t>(any(alarm)) << i;
     }
     return overtaken;
@@ -88,18 +96,19 @@ class ChangeDetector {
   static constexpr std::size_t kFour = 4;
   static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
   static constexpr float kNever = -1e30F;
-  /// Read from place 3 - i % 4 on it spares the models behind i in i's own group of four.
+  static constexpr std::size_t kLast = kWidth - kFour;  ///< the group of four that has the jumps
+  static_assert(kLast <= kCalm && kCalm <= 32);
+  /// Read from place 4 - n on it spares the first n of a group.
   static constexpr std::array<float, 2 * kFour> kBehind = {kNever, kNever, kNever, kNever,
                                                            0.0F,   0.0F,   0.0F,   0.0F};
-
-  static constexpr std::array<float, kWidth> kNeeded = [] {
-    std::array<float, kWidth> needed{};
-    for (std::size_t j = 0; j < kWidth; ++j) {
-      needed[j] = j < kCalm ? static_cast<float>(kThreshold) : kJumpThreshold;
+  /// Of the last group.
+  static constexpr std::array<float, kFour> kNeeded = [] {
+    std::array<float, kFour> needed{};
+    for (std::size_t j = 0; j < kFour; ++j) {
+      needed[j] = kLast + j < kCalm ? static_cast<float>(kThreshold) : kJumpThreshold;
     }
     return needed;
   }();
-  static_assert(kCalm <= 32);
 
   std::array<std::array<float, kWidth>, kCalm> sums_{};
 };

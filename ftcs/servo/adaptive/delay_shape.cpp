@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "ftcs/servo/adaptive/quick_math.h"
+
 namespace ftcs::adaptive {
 namespace {
 
@@ -22,7 +24,7 @@ double hazard(double u) noexcept {
     const double v = 1.0 / (u * u);
     return -u / (1.0 - v * (1.0 - v * (3.0 - v * (15.0 - v * 105.0))));
   }
-  const double phi = std::exp(-0.5 * u * u - 0.5 * kLn2Pi);
+  const double phi = quick_exp(-0.5 * u * u - 0.5 * kLn2Pi);
   return phi / (0.5 * std::erfc(-u * std::numbers::sqrt2 / 2.0));
 }
 
@@ -30,7 +32,7 @@ double hazard(double u) noexcept {
 
 Score normal_score(double innovation, double spread) noexcept {
   return {innovation / spread, 1.0 / spread,
-          -0.5 * (innovation * innovation / spread + std::log(spread) + kLn2Pi)};
+          -0.5 * (innovation * innovation / spread + quick_log(spread) + kLn2Pi)};
 }
 
 Score late_score(double innovation, double spread, double tail) noexcept {
@@ -41,12 +43,12 @@ Score late_score(double innovation, double spread, double tail) noexcept {
   const double u = (innovation - spread / tail) / sigma;
   if (u >= kFarLate) {
     return {1.0 / tail, kSmallestCurvature / spread,
-            -std::log(tail) + spread / (2.0 * tail * tail) - innovation / tail};
+            -quick_log(tail) + spread / (2.0 * tail * tail) - innovation / tail};
   }
   const double lambda = hazard(u);
-  return {
-      1.0 / tail - lambda / sigma, std::max(lambda * (u + lambda), kSmallestCurvature) / spread,
-      -std::log(tail) - innovation * innovation / (2.0 * spread) - 0.5 * kLn2Pi - std::log(lambda)};
+  return {1.0 / tail - lambda / sigma, std::max(lambda * (u + lambda), kSmallestCurvature) / spread,
+          -quick_log(tail) - innovation * innovation / (2.0 * spread) - 0.5 * kLn2Pi -
+              quick_log(lambda)};
 }
 
 double standard_late_log_density(double w, double k) noexcept {

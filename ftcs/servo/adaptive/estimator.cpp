@@ -318,7 +318,8 @@ void Estimator<Grid>::follow_scale() noexcept {
   }
   scale_ = robust_scale_;
   if (!mature) return;
-  const double wanted = std::pow(learnt / assumed, 0.5 / sides);
+  const double ratio = std::sqrt(learnt / assumed);
+  const double wanted = sides == 2 ? std::sqrt(ratio) : ratio;
   scale_ = std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_);
 }
 
@@ -355,7 +356,7 @@ void Estimator<Grid>::adopt_shapes() noexcept {
     });
     learner_[side].move_mean(shift);
   }
-  scale_ = std::pow(product, 0.25 * (sides == 1 ? 2.0 : 1.0));
+  scale_ = sides == 2 ? std::sqrt(std::sqrt(product)) : std::sqrt(product);
   for (std::size_t side = 0; side < 2; ++side) {
     if (!seen_[side]) continue;
     shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/servo/adaptive/quick_math.h"
+
 namespace ftcs::adaptive {
 namespace {
 
@@ -42,7 +44,8 @@ double normal_log_density(double w) noexcept { return -0.5 * w * w - 0.918938533
 /// moments look like queueing, but the floor of the delay is not where queueing would put it.
 double spoilt_log_density(double w) noexcept {
   const double outliers = w > 0.0 ? kOutliers / (10.0 * std::max(w, 3.0)) : 0.0;
-  return std::log((1.0 - kOutliers) * std::exp(normal_log_density(w)) + outliers + 1e-300);
+  const double normal = quick_exp(std::max(normal_log_density(w), -700.0));
+  return quick_log((1.0 - kOutliers) * normal + outliers);
 }
 
 }  // namespace
@@ -90,7 +93,7 @@ bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& sh
     }
     const double body = static_cast<double>(body_deviation_);
     const double from_body = (sample.innovation - static_cast<double>(body_mean_)) / body;
-    follow(spoilt_, spoilt_log_density(from_body) + std::log(deviation / body));
+    follow(spoilt_, spoilt_log_density(from_body) + quick_log(deviation / body));
   }
   return true;
 }

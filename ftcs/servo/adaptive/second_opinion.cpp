@@ -13,7 +13,7 @@ namespace {
 constexpr int kSteps = 3;
 /// No fit leaves much less than the roughness, which is the larger part of the noise; where
 /// innovations are below this part of the contradiction times the roughness, save the work.
-constexpr double kWorth = 0.4;
+constexpr double kWorth = 0.8;
 /// Cycles. No line is worth fitting across it, and the times before would cost digits.
 constexpr double kLongestGap = 1e5;
 /// Innovations of one direction that differ by less than this part are no noise.
