@@ -43,6 +43,7 @@ experiment::Shard parse_shard(const std::string& text) {
 
 void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
   for (Scenario& scenario : scenarios) {
+    if (options.medians_only && scenario.fresh_seeds != 0) scenario.seeds = scenario.fresh_seeds;
     if (options.seeds != 0) scenario.seeds = options.seeds;
     if (options.first_seed != 0) scenario.first_seed = options.first_seed;
     if (!options.servos.empty()) {

@@ -61,6 +61,8 @@ void read_run(TomlTable& root, Scenario& scenario) {
   scenario.first_seed =
       static_cast<std::uint64_t>(run.integer("first_seed", {0.0, 1e18}).value_or(1));
   scenario.seeds = static_cast<std::uint64_t>(run.integer("seeds", {1.0, 1e6}).value_or(20));
+  scenario.fresh_seeds =
+      static_cast<std::uint64_t>(run.integer("fresh_seeds", {1.0, 1e6}).value_or(0));
   run.finish();
 }
 

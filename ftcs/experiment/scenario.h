@@ -63,6 +63,7 @@ struct Scenario {
   MeasurementPlan plan;
   std::uint64_t first_seed = 1;
   std::uint64_t seeds = 1;
+  std::uint64_t fresh_seeds = 0;      ///< how many a median needs elsewhere; 0: as many as here
   std::vector<ScenarioServo> servos;  ///< the bound is the last one, where there is one
   std::vector<ScenarioLimit> limits;
   std::vector<std::string> notes;
