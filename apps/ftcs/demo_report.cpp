@@ -60,6 +60,7 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
     row["excursions"] = servo.excursions;
     row["rms_perceived_offset_ns"] = servo.rms_perceived_offset_ns;
     row["rms_time_error_ns"] = servo.rms_time_error_ns;
+    row["rms_second_half_ns"] = servo.rms_second_half_ns;
     row["rate_error_ppb"] = servo.rate_error_ppb;
     row["final_time_error_ns"] = servo.final_time_error_ns;
     row["samples"] = servo.samples;

@@ -80,6 +80,8 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   const std::size_t from = convergence.dwelt ? *convergence.dwelt : true_at_samples_.size() / 2;
   result.rms_perceived_offset_ns = rms(tail(perceived_, from));
   result.rms_time_error_ns = rms(tail(true_between_, (from + 1) * kPointsPerInterval));
+  const std::size_t half = true_at_samples_.size() / 2;
+  result.rms_second_half_ns = rms(tail(true_between_, (half + 1) * kPointsPerInterval));
   result.rate_error_ppb = rms(tail(rate_error_ppb_, from));
   bool inside = true;
   for (const double offset : tail(true_at_samples_, from)) {

@@ -40,6 +40,8 @@ struct TrialResult {
   double final_time_error_ns = 0.0;
   std::uint64_t samples = 0;
   std::uint64_t rejected = 0;
+  /// The true error over the second half of the run: the same messages whenever a servo locked.
+  double rms_second_half_ns = 0.0;
   std::vector<double> true_offsets_ns;  ///< at each sample
 };
 

@@ -90,6 +90,9 @@ TEST(ServoTrial, the_true_error_is_judged_not_the_offset_that_the_servo_sees) {
   const TrialResult result = world.result(1e5);
   EXPECT_GT(result.rms_perceived_offset_ns, 100.0);
   EXPECT_NE(result.rms_time_error_ns, result.rms_perceived_offset_ns);
+  EXPECT_GT(result.rms_second_half_ns, 0.0);
+  EXPECT_LT(result.rms_second_half_ns, 2.0 * result.rms_time_error_ns)
+      << "nothing of the start is in it";
 }
 
 TEST(LiveView, the_plot_rises_with_the_decades_and_keeps_its_width) {

@@ -6,7 +6,6 @@
 // 100 us away on an oscillator that is 20 ppm fast; nobody may step.
 //
 // monitor_trial SOCKET SECONDS: one JSON object on standard output.
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -65,22 +64,13 @@ class Trials {
           "\"true_error_rms_ns\": %.1f, \"perceived_rms_ns\": %.1f, \"rejected\": %llu}",
           i == 0 ? "" : ", ", result.servo.c_str(), result.locked ? "true" : "false",
           result.cycles_to_lock ? static_cast<long long>(*result.cycles_to_lock) : -1LL,
-          second_half_rms(*trials_[i]), result.rms_perceived_offset_ns,
+          result.rms_second_half_ns, result.rms_perceived_offset_ns,
           static_cast<unsigned long long>(result.rejected));
     }
     std::printf("]}\n");
   }
 
  private:
-  /// Of the second half, so that every servo has had the same time to settle.
-  static double second_half_rms(const app::ServoTrial& trial) {
-    const std::vector<double>& offsets = trial.true_offsets_ns();
-    double sum = 0.0;
-    const std::size_t first = offsets.size() / 2;
-    for (std::size_t i = first; i < offsets.size(); ++i) sum += offsets[i] * offsets[i];
-    return std::sqrt(sum / static_cast<double>(offsets.size() - first));
-  }
-
   std::vector<std::unique_ptr<app::ServoTrial>> trials_;
 };
 
