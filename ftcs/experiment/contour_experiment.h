@@ -37,8 +37,8 @@ struct ContourRow {
   std::uint64_t windows = 0;
   /// The same run with the drives' own limit: seconds until the first raises 0x001A; NaN: never.
   double first_fault_s = std::numeric_limits<double>::quiet_NaN();
-  std::uint64_t host_stalls = 0;  ///< live only: cycles that the host passed over
-  std::string ended;              ///< live only: why it ended before its time; empty: it did not
+  std::uint64_t late_windows = 0;  ///< live only: of the missed ones, for want of the host
+  std::string ended;               ///< live only: why it ended before its time; empty: it did not
   /// Largest of each group of kTraceGroup cycles, um.
   std::vector<double> trace_um;
   static constexpr int kTraceGroup = 20;

@@ -82,7 +82,7 @@ std::optional<std::vector<experiment::ContourRow>> run_live_contours(
     row.max_um = runner.figures().contour.max_absolute();
     row.trace_um = runner.figures().contour_trace;
     if (runner.main().failure()) row.ended = describe(runner.main().failure());
-    row.host_stalls = runner.figures().host_stalls;
+    row.late_windows = kDrives * runner.figures().late_windows;
     for (std::size_t n = 0; n < kDrives; ++n) {
       const auto& sync = (*segment)->server().segment()[n].drive().statistics();
       row.missed_windows += sync.missed;

@@ -210,6 +210,10 @@ std::int64_t MainRunner::margin_ns(const CycleSample& sample) const {
 void MainRunner::note(const CycleSample& sample, bool answered) {
   ++figures_.cycles;
   figures_.host_stalls += decision_.skipped;
+  // SYNC0 comes sync0_phase of a cycle after the frame's own place, and again with each cycle.
+  const double late = decision_.lateness.ns() / static_cast<double>(options_.servo.cycle.count());
+  figures_.late_windows +=
+      static_cast<std::uint64_t>(std::max(0.0, std::floor(late - options_.sync0_phase) + 1.0));
   if (answered && main_->last_cycle().inputs_valid) ++figures_.working_counter_right;
   const bool locked = decision_.state == CycleState::kLocked;
   if (locked && figures_.lock_cycle < 0) {

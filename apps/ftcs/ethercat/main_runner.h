@@ -87,7 +87,8 @@ struct RunFigures {
   std::uint64_t judged = 0;    ///< cycles within the gates after the lock: the figures below
   std::uint64_t excluded = 0;  ///< late or slow ones after the lock
   std::uint64_t working_counter_right = 0;
-  std::uint64_t host_stalls = 0;  ///< cycles passed over
+  std::uint64_t host_stalls = 0;   ///< cycles passed over
+  std::uint64_t late_windows = 0;  ///< SYNC0 events that a wake-up was too late for, for each drive
   std::int64_t lock_cycle = -1;
   std::int64_t op_cycle = -1;
   LockWatch lock;                         ///< how it came and went
