@@ -25,6 +25,7 @@ class Quantiser {
     }
     const std::int64_t tick = tick_.floor_ns();
     const std::int64_t raised = (instant.since_epoch() + tick_.half()).floor_ns();
+    if (tick == 1) return Instant<Timescale>::from_ns(raised);  // the usual one, without a division
     const std::int64_t remainder = raised % tick;
     return Instant<Timescale>::from_ns(raised - (remainder < 0 ? remainder + tick : remainder));
   }
