@@ -74,7 +74,8 @@ for name, offsets, sign in (
     ("json", [s["offset_ns"] for s in samples if s["offset_ns"] is not None], 1),
     ("csv", [float(r["offset_ns"]) for r in rows if r["offset_ns"]], -1),
 ):
-    assert 0.5e6 < sign * offsets[0] < 1.5e6, f"{name}: starts at {offsets[0]} ns"
+    # An answer to Delay_Req may correct the clock before the second Sync: then 1 ms is never perceived.
+    assert -200e3 < sign * offsets[0] < 1.5e6, f"{name}: starts at {offsets[0]} ns"
     assert sorted(map(abs, offsets[1:6]))[2] < 200e3, f"{name}: not corrected: {offsets[:6]}"
 assert samples[-1]["locked"] is True and samples[-1]["state"] == "locked"
 EOF
