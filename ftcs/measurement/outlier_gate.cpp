@@ -3,38 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include "ftcs/measurement/order_statistic.h"
 
 namespace ftcs {
 namespace {
 
 /// Standard deviation of a normal distribution in units of its median absolute deviation.
 constexpr double kSigmaPerMad = 1.4826;
-
-/// The value that stood at `wanted`, were the first `size` sorted (Hoare's FIND). In place of
-/// std::nth_element, which calls memmove: the cycle servo's C library has but memcpy and memset.
-template <class Values>
-double select(Values& values, std::ptrdiff_t size, std::ptrdiff_t wanted) noexcept {
-  const auto at = values.begin();
-  std::ptrdiff_t left = 0;
-  std::ptrdiff_t right = size - 1;
-  while (left < right) {
-    const double pivot = at[wanted];
-    std::ptrdiff_t i = left;
-    std::ptrdiff_t j = right;
-    while (i <= j) {
-      while (at[i] < pivot) ++i;
-      while (pivot < at[j]) --j;
-      if (i > j) break;
-      std::swap(at[i], at[j]);
-      ++i;
-      --j;
-    }
-    if (j < wanted) left = i;
-    if (wanted < i) right = j;
-  }
-  return at[wanted];
-}
 
 }  // namespace
 
@@ -70,7 +46,7 @@ void OutlierGate::learn(double innovation_ns) noexcept {
 // The upper one of two middle values; zero if there is none.
 double OutlierGate::median_of(Values values) const noexcept {
   const auto size = static_cast<std::ptrdiff_t>(size_);
-  return select(values, size, size / 2);
+  return order_statistic(values, size, size / 2);
 }
 
 double OutlierGate::spread_about(double centre) const noexcept {

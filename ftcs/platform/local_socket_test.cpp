@@ -36,6 +36,15 @@ class LocalSockets : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder); }
   [[nodiscard]] std::string file(const char* name) const { return (folder / name).string(); }
+  /// The file of a server that ended without removing it.
+  void leave_dead_socket() const {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    file("server").copy(address.sun_path, sizeof address.sun_path - 1);
+    const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+    ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    ::close(dead);
+  }
 
   std::filesystem::path folder;
 };
@@ -81,12 +90,7 @@ TEST_F(LocalSockets, ASecondServerIsRefused) {
 }
 
 TEST_F(LocalSockets, WhatADeadServerLeftIsReplaced) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  file("server").copy(address.sun_path, sizeof address.sun_path - 1);
-  const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
-  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  ::close(dead);
+  leave_dead_socket();
   ASSERT_TRUE(std::filesystem::exists(file("server")));
   auto client = LocalSocket::client();
   EXPECT_EQ(client->send(file("server"), octets("?"))->number, ECONNREFUSED);
@@ -143,12 +147,7 @@ TEST_F(LocalSockets, OthersMayNotWriteEvenWithoutAnyUmask) {
 }
 
 TEST_F(LocalSockets, ALeftOverThatAnotherProgramIsReplacingIsLeftToIt) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  file("server").copy(address.sun_path, sizeof address.sun_path - 1);
-  const int dead = ::socket(AF_UNIX, SOCK_DGRAM, 0);
-  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  ::close(dead);
+  leave_dead_socket();
   const int other = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY);
   ASSERT_EQ(::flock(other, LOCK_EX), 0);
   EXPECT_EQ(LocalSocket::bind(file("server")).error().kind, OsErrorKind::kAddressInUse);

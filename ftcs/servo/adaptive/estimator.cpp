@@ -56,6 +56,13 @@ constexpr double kFloorDoubt = 0.06;
 
 double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
 
+/// Geometric mean of the standard deviations of one or both directions, of the product of their
+/// variances.
+double common_deviation(double variances, int sides) noexcept {
+  const double root = std::sqrt(variances);
+  return sides == 2 ? std::sqrt(root) : root;
+}
+
 }  // namespace
 
 template <class Grid>
@@ -318,8 +325,7 @@ void Estimator<Grid>::follow_scale() noexcept {
   }
   scale_ = robust_scale_;
   if (!mature) return;
-  const double ratio = std::sqrt(learnt / assumed);
-  const double wanted = sides == 2 ? std::sqrt(ratio) : ratio;
+  const double wanted = common_deviation(learnt / assumed, sides);
   scale_ = std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_);
 }
 
@@ -356,7 +362,7 @@ void Estimator<Grid>::adopt_shapes() noexcept {
     });
     learner_[side].move_mean(shift);
   }
-  scale_ = sides == 2 ? std::sqrt(std::sqrt(product)) : std::sqrt(product);
+  scale_ = common_deviation(product, sides);
   for (std::size_t side = 0; side < 2; ++side) {
     if (!seen_[side]) continue;
     shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "ftcs/measurement/order_statistic.h"
+
 namespace ftcs::adaptive {
 namespace {
 
@@ -46,8 +48,8 @@ void smallest_first(Value* values, std::size_t count, std::size_t wanted, Less l
 template <std::size_t Capacity>
 double ranked(std::array<double, Capacity>& values, std::size_t count, std::size_t rank) noexcept {
   if (count == 0) return std::numeric_limits<double>::infinity();
-  smallest_first(values.data(), count, rank + 1, [](double x, double y) { return x < y; });
-  return values[rank];
+  return order_statistic(values, static_cast<std::ptrdiff_t>(count),
+                         static_cast<std::ptrdiff_t>(rank));
 }
 
 }  // namespace
