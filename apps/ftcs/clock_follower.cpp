@@ -63,6 +63,7 @@ DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stam
   config.servo.adaptive.learnt = learnt;
   config.step = step_policy(options);
   config.largest_first_offset = kLargestFirstOffset;
+  config.largest_rate_change = options.steering.largest_rate_change;
   return config;
 }
 
@@ -81,9 +82,7 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
       link_delay_(options.servo.two_way.path_delay) {
   if (!state_.learnt()) return;
   // At the known rate from now on, long before the first message: what a driftfile is for.
-  ServoCommand command;
-  command.tracking_rate = Rate::from_ratio(1.0 / (1.0 + state_.learnt()->rate_deviation));
-  if (!clock.apply(command))
+  if (discipline_.start_at(Rate::from_ratio(1.0 / (1.0 + state_.learnt()->rate_deviation))))
     log(LogLevel::kWarning, "{}: the clock refuses the driftfile's rate", label_);
 }
 

@@ -6,7 +6,6 @@
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_presets.h"
-#include "ftcs/servo/any_servo.h"
 
 namespace ftcs::app {
 namespace {
@@ -78,8 +77,8 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
 }
 
 void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
+  add_steering_flags(command, arguments.steering);
   Flags flags(command);
-  flags.value("--servo", arguments.servo, "NAME", servo_names() + "; default adaptive");
   flags.value("--offset-gain", arguments.offset_gain, "P",
               "ftcs: p inside the band, 0 to 1; default 1/16");
   flags.value("--converged-band", arguments.converged_band, "BAND",
@@ -90,8 +89,6 @@ void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
       ->check(integer_from(0, 1'000'000'000));
   flags.value("--correction-time", arguments.correction_time, "TIME",
               "ftcs: T_c, in which an offset is removed; default: the Sync interval");
-  flags.value("--max-frequency", arguments.max_frequency, "RATE",
-              "largest adjustment, for example 500ppm");
 }
 
 void add_clock_flags(CLI::App& command, PtpArguments& arguments) {
@@ -165,14 +162,6 @@ void add_ptp_arguments(CLI::App& command, PtpArguments& arguments) {
         ->type_name("VALUE")
         ->group("Settings of ptp4l's configuration file");
   }
-}
-
-std::string servo_names() {
-  std::string names;
-  for (const ServoKindName& known : kServoKinds) {
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", known.name);
-  }
-  return names;
 }
 
 }  // namespace ftcs::app

@@ -9,6 +9,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "apps/ftcs/steering_arguments.h"
+
 namespace ftcs::app {
 
 /// The command line as it was given: a configuration file is read first, the command line wins.
@@ -24,12 +26,11 @@ struct PtpArguments {
   std::string ptp4l_socket;
   std::string chrony_socket;
   std::optional<int> ntp_shm_unit;
-  std::string servo;
+  SteeringArguments steering;
   std::optional<double> offset_gain;
   std::string converged_band;
   std::optional<std::uint32_t> converged_dwell;
   std::string correction_time;
-  std::string max_frequency;
   std::string clock = "virtual";
   std::string offset;
   std::string skew;
@@ -48,8 +49,5 @@ struct PtpArguments {
 /// The flags of `ftcs ptp`: ptp4l's, our own, and every setting of ptp4l's configuration file.
 /// `arguments` must outlive `command`.
 void add_ptp_arguments(CLI::App& command, PtpArguments& arguments);
-
-/// "adaptive, ftcs, pics ..."
-[[nodiscard]] std::string servo_names();
 
 }  // namespace ftcs::app

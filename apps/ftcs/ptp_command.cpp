@@ -39,13 +39,7 @@ std::optional<std::string> ftcs_flag(const PtpArguments& arguments) {
 
 Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   ServoConfig& servo = options.servo;
-  if (!arguments.servo.empty()) {
-    const auto kind = servo_kind_from_name(arguments.servo);
-    if (!kind) {
-      return fmt::format("--servo: unknown servo '{}' (known: {})", arguments.servo, servo_names());
-    }
-    servo.kind = *kind;
-  }
+  if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
   if (const auto flag = ftcs_flag(arguments); flag && servo.kind != ServoKind::kFtcs) {
     return fmt::format("{} is of the servo ftcs, this one is {}: add --servo ftcs", *flag,
@@ -63,14 +57,12 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
     if (!band) return "--converged-band: " + band.error().message;
     servo.ftcs.converged_band = *band;
   }
-  if (!arguments.max_frequency.empty()) {
-    const auto ppb = parse_ppb(arguments.max_frequency);
-    if (!ppb) return "--max-frequency: " + ppb.error().message;
-    if (*ppb <= 0.0) return "--max-frequency: must be greater than zero";
-    servo.limits = RateLimits::symmetric_ppb(*ppb);
+  if (auto wrong = apply_steering(arguments.steering, servo, options.steering)) return wrong;
+  if (options.steering.never_step) {
+    if (options.first_step) return "--never-step and --first-step exclude each other";
+    options.first_step_threshold = options.step_threshold = Nanoseconds{0};
   }
-  if (const auto error = validate(servo)) return std::string(describe(*error));
-  return std::nullopt;
+  return check_steering(servo, options.steering);
 }
 
 Wrong apply_clock(const PtpArguments& arguments, PtpOptions& options) {

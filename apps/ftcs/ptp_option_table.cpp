@@ -170,11 +170,12 @@ Wrong set_uds_address(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
-Wrong set_max_frequency(PtpOptions& options, std::string_view text) {
-  const auto ppb = parse_number(text, 1.0, 900'000'000.0);
-  if (!ppb) return ppb.error().message;
-  options.servo.limits = RateLimits::symmetric_ppb(*ppb);
-  return std::nullopt;
+/// A number that `set` judges.
+template <class Target>
+Wrong number_for(Wrong (*set)(double, Target&), std::string_view text, Target& target) {
+  double value = 0.0;
+  if (auto wrong = number(text, value, std::numeric_limits<double>::lowest())) return wrong;
+  return set(value, target);
 }
 
 #define FTCS_SET(expression) [](PtpOptions& o, std::string_view v) -> Wrong { return expression; }
@@ -251,7 +252,16 @@ constexpr std::array kSettings{
     PtpSetting{"free_running", "1: measure, do not steer", FTCS_SET(boolean(v, o.free_running))},
     PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
     PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
-    PtpSetting{"max_frequency", "ppb", set_max_frequency},
+    PtpSetting{"max_frequency", "ppb", FTCS_SET(number_for(set_max_frequency, v, o.servo))},
+    PtpSetting{"max_frequency_change", "ppb: as --max-frequency-change",
+               FTCS_SET(number_for(set_max_frequency_change, v, o.steering))},
+    PtpSetting{"frequency_granularity", "ppb: as --frequency-granularity",
+               FTCS_SET(number_for(set_frequency_granularity, v, o.servo))},
+    PtpSetting{"timer_granularity", "ns: as --timer-granularity",
+               FTCS_SET(number_for(set_timer_granularity, v, o.servo))},
+    PtpSetting{"steering_latency", "ns: as --steering-latency",
+               FTCS_SET(number_for(set_steering_latency, v, o.servo))},
+    PtpSetting{"never_step", "1: as --never-step", FTCS_SET(boolean(v, o.steering.never_step))},
     PtpSetting{"driftfile", "file that keeps the learnt rate and noise over restarts",
                set_driftfile},
     PtpSetting{"driftfile_interval", "s between two writes; default 3600",

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/ftcs/steering_arguments.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/platform/ptp_socket.h"
 #include "ftcs/platform/timestamp_clock.h"
@@ -83,6 +84,7 @@ struct PtpOptions {
   Nanoseconds delay_asymmetry{0};
 
   ServoConfig servo = ptp_servo_defaults();
+  SteeringRules steering{};
   ClockKind clock = ClockKind::kVirtual;
   std::string clock_device{};  ///< kPhc: /dev/ptpN, which must be the interface's; empty: any
   std::string leap_file{};     ///< leap-seconds.list

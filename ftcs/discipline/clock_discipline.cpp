@@ -6,9 +6,22 @@
 namespace ftcs {
 namespace {
 
-ServoConfig limited(ServoConfig config, const RateLimits& limits) noexcept {
-  config.limits = limits;
-  return config;
+/// A command of the adaptive servo keeps both of its rates this near to the last tracking rate, and
+/// rounds them: with half of what may change, the end of a correction keeps to the limit too.
+double planned_rate_change(const SteeringLimits& steering, double largest) noexcept {
+  const double room = largest - steering.rate_granularity;
+  const double planned = (room > 0.0 ? room : largest) / 2.0;
+  return steering.rate_change > 0.0 ? std::min(steering.rate_change, planned) : planned;
+}
+
+ServoConfig limited(const DisciplineConfig& config, const RateLimits& limits) noexcept {
+  ServoConfig servo = config.servo;
+  servo.limits = limits;
+  if (config.largest_rate_change > 0.0) {
+    SteeringLimits& steering = servo.adaptive.steering;
+    steering.rate_change = planned_rate_change(steering, config.largest_rate_change);
+  }
+  return servo;
 }
 
 }  // namespace
@@ -17,9 +30,21 @@ ClockDiscipline::ClockDiscipline(const DisciplineConfig& config, AdjustableClock
     : config_(config),
       clock_(clock),
       limits_(intersect(config.servo.limits, clock.rate_limits())),
-      servo_(make_servo(limited(config.servo, limits_))),
+      servo_(make_servo(limited(config, limits_))),
       lock_(config.lock),
+      rate_change_(config.largest_rate_change),
       sync_interval_(config.servo.sync_interval) {}
+
+std::optional<ClockError> ClockDiscipline::start_at(Rate rate) noexcept {
+  begin(clock_.read());
+  ServoCommand command;
+  command.tracking_rate = rate;
+  command = within_limits(command);
+  const Result<ClockReading, ClockError> applied = clock_.apply(command);
+  if (!applied) return applied.error();
+  rate_change_.note(command, applied->free_running);
+  return std::nullopt;
+}
 
 Telemetry ClockDiscipline::on_pair(const EventPair& event) noexcept {
   const ClockReading now = clock_.read();
@@ -127,6 +152,7 @@ void ClockDiscipline::steer(const ServoCommand& wanted, Duration offset) noexcep
     ++counters_.apply_errors;
     return;
   }
+  rate_change_.note(command, applied->free_running);
   first_command_ = false;
   ++counters_.commands;
   if (at_limit(command)) ++counters_.clamps;
@@ -157,7 +183,9 @@ ServoCommand ClockDiscipline::with_step(ServoCommand command, Duration offset) c
   return {command.tracking_rate, Duration{}, command.tracking_rate, -offset};
 }
 
-ServoCommand ClockDiscipline::within_limits(ServoCommand command) const noexcept {
+ServoCommand ClockDiscipline::within_limits(ServoCommand command) noexcept {
+  rate_change_.begin(clock_, telemetry_.reading.free_running);
+  command = rate_change_.limited(command, telemetry_.reading.free_running);
   command.tracking_rate = limits_.clamp(command.tracking_rate);
   command.correction_rate = limits_.clamp(command.correction_rate);
   return command;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "ftcs/clock/adjustable_clock.h"
 #include "ftcs/discipline/lock_detector.h"
+#include "ftcs/discipline/rate_change_limit.h"
 #include "ftcs/discipline/step_policy.h"
 #include "ftcs/discipline/telemetry.h"
 #include "ftcs/servo/any_servo.h"
@@ -18,6 +20,9 @@ struct DisciplineConfig {
   /// A larger first offset is not steered but refused, message by message: a slew over seconds is a
   /// mistake of the set-up. Zero: no bound. Not asked where the policy permits a step.
   Nanoseconds largest_first_offset{0};
+  /// The rate of the clock changes by no more at a time, dimensionless. Zero: any. The adaptive
+  /// servo plans with it, any other is cut.
+  double largest_rate_change = 0.0;
   /// Sync intervals without a usable sample before holdover: more than one or two lost messages.
   std::uint32_t missed_intervals_to_holdover = 4;
 };
@@ -33,6 +38,8 @@ class ClockDiscipline {
   /// The clock must outlive the discipline. Valid: validate(config.servo) finds nothing.
   ClockDiscipline(const DisciplineConfig& config, AdjustableClock& clock) noexcept;
 
+  /// Before the first message: from now on at this rate, which somebody knows already.
+  [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept;
   Telemetry on_pair(const EventPair& pair) noexcept;
   /// To be called when nothing has come for a while, as often as liked: samples missing for
   /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking rate.
@@ -54,7 +61,7 @@ class ClockDiscipline {
   void check_silence(const ClockReading& reading) noexcept;
   void steer(const ServoCommand& wanted, Duration offset) noexcept;
   [[nodiscard]] ServoCommand with_step(ServoCommand command, Duration offset) const noexcept;
-  [[nodiscard]] ServoCommand within_limits(ServoCommand command) const noexcept;
+  [[nodiscard]] ServoCommand within_limits(ServoCommand command) noexcept;
   [[nodiscard]] bool at_limit(const ServoCommand& command) const noexcept;
   [[nodiscard]] bool refuses(Duration offset) const noexcept;
   const Telemetry& finish() noexcept;
@@ -64,6 +71,7 @@ class ClockDiscipline {
   RateLimits limits_;
   AnyServo servo_;
   LockDetector lock_;
+  RateChangeLimit rate_change_;
   bool first_command_ = true;
   bool in_holdover_ = false;
   bool has_sample_ = false;

@@ -49,7 +49,15 @@ expect 2 "is no band" ptp -i lo --servo ftcs --converged-band 5us:1us
 expect 2 "--offset-gain is of the servo ftcs, this one is adaptive: add --servo ftcs" ptp -i lo --offset-gain 0.5
 expect 2 "'1' is no time" ptp -i lo --offset 1
 expect 2 "'50' is no rate" ptp -i lo --skew 50
-expect 2 "greater than zero" ptp -i lo --max-frequency -1ppm
+expect 2 "--max-frequency: -1000 ppb: expected 1 to 9e+08 ppb" ptp -i lo --max-frequency -1ppm
+expect 2 "--max-frequency-change: '1' is no rate" ptp -i lo --max-frequency-change 1
+expect 2 "--max-frequency-change: -1000 ppb: expected 0 to 9e+08 ppb" ptp -i lo --max-frequency-change -1ppm
+expect 2 "--frequency-granularity: 200000000 ppb: expected 0 to 1e+08 ppb" ptp -i lo --frequency-granularity 200000ppm
+expect 2 "--timer-granularity: 2000000000 ns: expected 0 to 1e+09 ns" ptp -i lo --timer-granularity 2s
+expect 2 "steering_latency: -1 ns: expected 0 to 1e+09 ns" ptp -i lo --steering_latency -1
+expect 2 "max_frequency_change: the servo linuxptp-pi cannot keep to it" ptp -i lo --max-frequency-change 1ppm --servo linuxptp-pi
+expect 2 "coarser than max_frequency" ptp -i lo --max-frequency 10ppb --frequency-granularity 20ppb
+expect 2 "--never-step and --first-step exclude each other" ptp -i lo --never-step --first-step
 expect 2 "not an IPv4 address" ptp -i lo --unicast somewhere
 expect 2 "must differ" ptp -i lo --event-port 4000 --general-port 4000
 expect 2 "--role" ptp -i lo --role grandmaster
@@ -70,6 +78,10 @@ config "[global]" "domainNumber 0" "colour blue"
 expect 2 "ptp.conf:3: unknown setting 'colour'" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "" "# a comment" "delay_mechanism Auto"
 expect 2 "ptp.conf:4: delay_mechanism: 'Auto' is not supported, only E2E and P2P" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "max_frequency_change 1e10"
+expect 2 "ptp.conf:2: max_frequency_change: 1e+10 ppb: expected 0 to 9e+08 ppb" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "timer_granularity 1000" "clock_servo pi"
+expect 2 "timer_granularity: the servo linuxptp-pi cannot keep to it" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "logSyncInterval zero"
 expect 2 "ptp.conf:2: logSyncInterval" ptp -i lo -f "$folder/ptp.conf"
 config "domainNumber 0"

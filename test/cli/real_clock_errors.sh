@@ -50,6 +50,11 @@ expect 2 "-O and --leapfile exclude each other" phc -s /dev/ptp0 -O 0 --leapfile
 expect 2 "only where CLOCK_REALTIME is steered" phc -s CLOCK_REALTIME -c eth0 --leapfile x
 expect 2 "'linreg' is not supported" phc -s /dev/ptp0 -O 0 -E linreg
 expect 2 "-P and -I are of the pi servo" phc -s /dev/ptp0 -O 0 -P 1
+expect 2 "--max-frequency: 0 ppb: expected 1 to 9e+08 ppb" phc -s /dev/ptp0 -O 0 --max-frequency 0
+expect 2 "--steering-latency: '5' is no time" phc -s /dev/ptp0 -O 0 --steering-latency 5
+expect 2 "frequency_granularity: the servo linuxptp-pi cannot keep to it" phc -s /dev/ptp0 -O 0 -E pi --frequency-granularity 1ppb
+expect 2 "not finer than max_frequency_change" phc -s /dev/ptp0 -O 0 --max-frequency-change 1ppb --frequency-granularity 1ppb
+expect 2 "--never-step excludes -F and -S" phc -s /dev/ptp0 -O 0 --never-step -F 0.001
 expect 2 "unknown servo 'magic'" phc -s /dev/ptp0 -O 0 --servo magic
 expect 2 "a PPS source is not supported" phc -d /dev/pps0
 expect 2 "-R: '0': expected a number" phc -R 0

@@ -10,8 +10,7 @@
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/phc/phc_options.h"
 #include "apps/ftcs/phc/phc_runner.h"
-#include "apps/ftcs/ptp_arguments.h"
-#include "apps/ftcs/units.h"
+#include "apps/ftcs/steering_arguments.h"
 
 namespace ftcs::app {
 namespace {
@@ -21,13 +20,12 @@ using Wrong = std::optional<std::string>;
 /// The command line as it was given.
 struct PhcArguments {
   PhcOptions options;
-  std::string servo;
+  SteeringArguments steering;
   std::string law;  ///< -E
   std::optional<double> proportional;
   std::optional<double> integral;
   std::optional<double> first_step_s;
   std::optional<double> step_s;
-  std::string max_frequency;
   std::optional<double> duration_s;
   bool leap_by_us = false;
   int system_clock = 0;  ///< how many -r
@@ -83,8 +81,7 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
 }
 
 void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
-  command.add_option("--servo", arguments.servo, servo_names() + "; default adaptive")
-      ->type_name("NAME");
+  add_steering_flags(command, arguments.steering);
   command.add_option("-E", arguments.law, "pi: as --servo linuxptp-pi")->type_name("NAME");
   command.add_option("-P", arguments.proportional, "pi: proportional constant; default 0.7")
       ->type_name("KP")
@@ -100,10 +97,6 @@ void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
   command.add_option("-S", arguments.step_s, "step at any time above this; default 0: never")
       ->type_name("SECONDS")
       ->check(number_from(0.0, 1e9));
-  command
-      .add_option("--max-frequency", arguments.max_frequency,
-                  "largest adjustment, for example 500ppm")
-      ->type_name("RATE");
 }
 
 void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
@@ -153,27 +146,31 @@ Wrong apply_servo(const PhcArguments& arguments, PhcOptions& options) {
     }
     servo.kind = ServoKind::kLinuxptpPi;
   }
-  if (!arguments.servo.empty()) {
-    if (!arguments.law.empty()) return "-E and --servo exclude each other";
-    const auto kind = servo_kind_from_name(arguments.servo);
-    if (!kind) {
-      return fmt::format("--servo: unknown servo '{}' (known: {})", arguments.servo, servo_names());
-    }
-    servo.kind = *kind;
+  if (!arguments.steering.servo.empty() && !arguments.law.empty()) {
+    return "-E and --servo exclude each other";
   }
+  if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
   if ((arguments.proportional || arguments.integral) && servo.kind != ServoKind::kLinuxptpPi) {
     return "-P and -I are of the pi servo: -E pi";
   }
   if (arguments.proportional) servo.linuxptp_pi.proportional_const = *arguments.proportional;
   if (arguments.integral) servo.linuxptp_pi.integral_const = *arguments.integral;
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
-  if (!arguments.max_frequency.empty()) {
-    const auto ppb = parse_ppb(arguments.max_frequency);
-    if (!ppb) return "--max-frequency: " + ppb.error().message;
-    if (*ppb <= 0.0) return "--max-frequency: must be greater than zero";
-    servo.limits = RateLimits::symmetric_ppb(*ppb);
+  if (auto wrong = apply_steering(arguments.steering, servo, options.steering)) return wrong;
+  return check_steering(servo, options.steering);
+}
+
+Wrong apply_steps(const PhcArguments& arguments, PhcOptions& options) {
+  const auto nanoseconds = [](double seconds) {
+    return Nanoseconds{Duration::from_ns(seconds * 1e9).rounded_ns()};
+  };
+  if (arguments.first_step_s) options.first_step_threshold = nanoseconds(*arguments.first_step_s);
+  if (arguments.step_s) options.step_threshold = nanoseconds(*arguments.step_s);
+  if (!options.steering.never_step) return std::nullopt;
+  if (arguments.first_step_s.value_or(0.0) > 0.0 || arguments.step_s.value_or(0.0) > 0.0) {
+    return "--never-step excludes -F and -S";
   }
-  if (const auto error = validate(servo)) return std::string(describe(*error));
+  options.first_step_threshold = options.step_threshold = Nanoseconds{0};
   return std::nullopt;
 }
 
@@ -212,18 +209,14 @@ Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) 
 }
 
 Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
-  const auto nanoseconds = [](double seconds) {
-    return Nanoseconds{Duration::from_ns(seconds * 1e9).rounded_ns()};
-  };
   if (auto wrong = check_automatic(arguments, options)) return wrong;
   if (options.source.empty() && !options.automatic)
     return "no source: give one with -s, for example -s eth0";
-  if (arguments.first_step_s) options.first_step_threshold = nanoseconds(*arguments.first_step_s);
-  if (arguments.step_s) options.step_threshold = nanoseconds(*arguments.step_s);
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
   options.kernel_leap = !arguments.leap_by_us;
   if (auto wrong = apply_offset(options)) return wrong;
-  return apply_servo(arguments, options);
+  if (auto wrong = apply_servo(arguments, options)) return wrong;
+  return apply_steps(arguments, options);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/ftcs/phc/port_watch.h"
+#include "apps/ftcs/steering_arguments.h"
 #include "ftcs/servo/any_servo.h"
 #include "ftcs/time/duration.h"
 
@@ -34,6 +35,7 @@ struct PhcOptions {
   int readings = 5;
   double rate_hz = 1.0;
   ServoConfig servo = phc_servo_defaults();
+  SteeringRules steering{};
   bool free_running = false;
   Nanoseconds first_step_threshold{20'000};
   Nanoseconds step_threshold{0};

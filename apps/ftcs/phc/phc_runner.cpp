@@ -20,6 +20,7 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 DisciplineConfig discipline_config(const PhcOptions& options, bool exact) {
   DisciplineConfig config;
   config.servo = options.servo;
+  config.largest_rate_change = options.steering.largest_rate_change;
   config.servo.sync_interval =
       Nanoseconds{static_cast<std::int64_t>(static_cast<double>(kNsPerSecond) / options.rate_hz)};
   if (exact) config.servo.two_way.fixed_path_delay = Nanoseconds{0};

@@ -83,6 +83,27 @@ TEST(PhcRunner, never_steps_if_told_so_and_is_there_within_two_readings) {
   EXPECT_LT(world.largest_difference(20.0, 3.0), 200.0);
 }
 
+TEST(PhcRunner, changes_the_rate_by_no_more_at_a_time_than_it_may) {
+  constexpr double kLimit = 5e-6;
+  constexpr double kUnit = 2e-6 / 65536.0;  // the kernel's, at either end
+  World world;
+  world.options.source = "CLOCK_REALTIME";
+  world.options.sink = "/dev/ptp0";
+  world.options.steering = {kLimit, true};
+  world.options.first_step_threshold = Nanoseconds{0};
+  world.options.rate_hz = 8.0;
+  world.kernel.phc.time_ns = 10e3;
+  double last = 1.0;
+  double largest = 0.0;
+  world.kernel.on_clock_read = [&] {
+    const double rate = world.kernel.phc.steering();
+    largest = std::max(largest, std::abs(rate - last));
+    last = rate;
+  };
+  EXPECT_LT(world.largest_difference(40.0, 30.0), 200.0);
+  EXPECT_LE(largest, kLimit + kUnit);
+}
+
 TEST(PhcRunner, by_every_way_of_comparing_clocks) {
   for (const bool precise : {true, false}) {
     World world;
