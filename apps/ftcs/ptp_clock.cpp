@@ -33,7 +33,10 @@ Result<ClockDevice, std::string> open_device(platform::Kernel& kernel, const Ptp
   auto device = hardware ? ClockDevice::open_phc_of(kernel, options.interface, access)
                          : ClockDevice::open_system(kernel, access);
   if (!device) return device.error().message();
-  if (!options.clock_device.empty() && options.clock_device != device->name()) {
+  if (options.clock_device.empty()) return std::move(*device);
+  const auto named = ClockDevice::open_phc(kernel, options.clock_device, ClockAccess::kRead);
+  if (!named) return named.error().message();
+  if (!named->is_same_clock(*device)) {
     return fmt::format("{}: hardware timestamps of {} are of {}", options.clock_device,
                        options.interface, device->name());
   }

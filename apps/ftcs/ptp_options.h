@@ -86,7 +86,7 @@ struct PtpOptions {
   ServoConfig servo = ptp_servo_defaults();
   SteeringRules steering{};
   ClockKind clock = ClockKind::kVirtual;
-  std::string clock_device{};  ///< kPhc: /dev/ptpN, which must be the interface's; empty: any
+  std::string clock_device{};  ///< kPhc: must be the interface's clock; empty: it is
   std::string leap_file{};     ///< leap-seconds.list
   bool kernel_leap = true;     ///< ptp4l's kernel_leap: leap seconds are the kernel's to make
   bool free_running = false;   ///< ptp4l's free_running: measure, steer nothing

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <limits>
 #include <linux/ptp_clock.h>
+#include <sys/sysmacros.h>
 #include <utility>
 
 #include "ftcs/platform/network_interface.h"
@@ -93,6 +94,7 @@ Result<ClockDevice, OsError> ClockDevice::open_phc(Kernel& kernel, const std::st
   if (fd < 0) return device_error(-fd, path);
   ClockDevice device(kernel, path, clock_id_of(fd));
   device.device_ = Descriptor(kernel, fd);
+  device.number_ = kernel.device_number(fd);
   ptp_clock_caps capabilities{};
   if (const int result = kernel.control(fd, PTP_CLOCK_GETCAPS, &capabilities); result < 0) {
     OsError error = device_error(-result, path);
@@ -116,12 +118,7 @@ Result<ClockDevice, OsError> ClockDevice::open_phc(Kernel& kernel, const std::st
 
 Result<ClockDevice, OsError> ClockDevice::open_phc_of(Kernel& kernel, const std::string& interface,
                                                       ClockAccess access) {
-  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
-  if (fd < 0) return os_error(-fd, "socket");
-  const Descriptor socket(kernel, fd);
-  const auto state = interface_state(kernel, fd, interface);
-  if (!state) return state.error();
-  const auto capabilities = interface_capabilities(kernel, fd, interface);
+  const auto capabilities = interface_capabilities(kernel, interface);
   if (!capabilities) return capabilities.error();
   if (capabilities->phc_index < 0) {
     return OsError{OsErrorKind::kTimestampingUnsupported, 0,
@@ -130,24 +127,38 @@ Result<ClockDevice, OsError> ClockDevice::open_phc_of(Kernel& kernel, const std:
   return open_phc(kernel, "/dev/ptp" + std::to_string(capabilities->phc_index), access);
 }
 
-// Two servos on one clock would fight. A hardware clock is taken as the device that it is. The
-// system clock has none: a name, and a file that other network namespaces see too. Where names
-// cannot be held (a simulator without UNIX sockets) its clock is not this machine's.
+// Two servos on one clock would fight. The node of a hardware clock is locked, which other mount
+// and network namespaces with the same node see. Nodes may be many, and the system clock has none:
+// so the clock itself is held too, as a name, and as a file that other network namespaces see.
+// Where names cannot be held (a simulator without UNIX sockets) the clock is not this machine's.
 std::optional<OsError> ClockDevice::hold() {
-  if (!is_system()) {
-    if (kernel_->lock(device_.get()) == -EWOULDBLOCK) return os_error(EADDRINUSE, name_);
-    return std::nullopt;
-  }
-  const int held = kernel_->hold_name("ftcs clock realtime");
-  if (held == -EADDRINUSE) return os_error(EADDRINUSE, name_);
+  const auto busy = [this] { return os_error(EADDRINUSE, name_); };
+  if (!is_system() && kernel_->lock(device_.get()) == -EWOULDBLOCK) return busy();
+  const std::string clock = identity();
+  if (clock.empty()) return std::nullopt;
+  const int held = kernel_->hold_name(("ftcs clock " + clock).c_str());
+  if (held == -EADDRINUSE) return busy();
   if (held < 0) return std::nullopt;
   hold_ = Descriptor(*kernel_, held);
-  const int file =
-      kernel_->open("/run/ftcs-clock-realtime.lock", O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW);
+  const std::string path = "/run/ftcs-clock-" + clock + ".lock";
+  const int file = kernel_->open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW);
   if (file < 0) return std::nullopt;
-  device_ = Descriptor(*kernel_, file);
-  if (kernel_->lock(file) == -EWOULDBLOCK) return os_error(EADDRINUSE, name_);
+  lock_file_ = Descriptor(*kernel_, file);
+  if (kernel_->lock(file) == -EWOULDBLOCK) return busy();
   return std::nullopt;
+}
+
+std::string ClockDevice::identity() const {
+  if (is_system()) return "realtime";
+  if (number_ <= 0) return {};
+  const auto number = static_cast<dev_t>(number_);
+  return "ptp-" + std::to_string(major(number)) + "-" + std::to_string(minor(number));
+}
+
+bool ClockDevice::is_same_clock(const ClockDevice& other) const {
+  const std::string ours = identity();
+  const std::string theirs = other.identity();
+  return ours.empty() || theirs.empty() ? name_ == other.name_ : ours == theirs;
 }
 
 // A tick of zero is refused whatever the clock; whether as EPERM or as EINVAL tells the rights, and

@@ -22,8 +22,8 @@ class ClockDevice {
   /// CLOCK_REALTIME. kSteer: refused without the right to set it, and while another program of ours
   /// steers it. Nothing is touched.
   [[nodiscard]] static Result<ClockDevice, OsError> open_system(Kernel& kernel, ClockAccess access);
-  /// "/dev/ptp0". kSteer: opened for writing, exclusively among our programs, whatever name they
-  /// call it by.
+  /// "/dev/ptp0". kSteer: opened for writing, exclusively among our programs, by whatever name and
+  /// through whichever node they open it.
   [[nodiscard]] static Result<ClockDevice, OsError> open_phc(Kernel& kernel,
                                                              const std::string& path,
                                                              ClockAccess access);
@@ -55,6 +55,8 @@ class ClockDevice {
   [[nodiscard]] bool is_system() const noexcept { return id_ == CLOCK_REALTIME; }
   /// "CLOCK_REALTIME", "/dev/ptp0".
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  /// Another name, or another node of the same device, is no other clock.
+  [[nodiscard]] bool is_same_clock(const ClockDevice& other) const;
   /// Of a hardware clock: for the ioctls of <linux/ptp_clock.h>.
   [[nodiscard]] int descriptor() const noexcept { return device_.get(); }
   [[nodiscard]] Kernel& kernel() noexcept { return *kernel_; }
@@ -66,14 +68,18 @@ class ClockDevice {
       : kernel_(&kernel), name_(std::move(name)), id_(id) {}
 
   [[nodiscard]] std::optional<OsError> hold();
+  /// The same for whatever leads to this clock; empty: the kernel does not tell.
+  [[nodiscard]] std::string identity() const;
   [[nodiscard]] std::optional<OsError> probe_rights();
   [[nodiscard]] std::optional<ClockError> failed(int result) noexcept;
 
   Kernel* kernel_;
   std::string name_;
   clockid_t id_;
-  Descriptor device_{};  // of CLOCK_REALTIME: the lock file
+  Descriptor device_{};
+  std::int64_t number_ = 0;  // of the device, as Kernel::device_number()
   Descriptor hold_{};
+  Descriptor lock_file_{};
   RateLimits limits_{};
   int error_number_ = 0;
 };

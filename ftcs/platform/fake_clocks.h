@@ -49,6 +49,7 @@ class FakeClocks final : public FakeKernel {
   bool phc_gone = false;
   bool short_cross_reads = false;
   bool run_folder_is_writable = true;
+  bool device_numbers_known = true;
   std::set<std::string> held_names;  ///< and locked descriptors; for good
   int commands = 0;                  ///< adjust_clock() calls that asked for a change and got it
   std::int64_t timer_ns = 0;
@@ -77,15 +78,25 @@ class FakeClocks final : public FakeKernel {
     return now;
   }
   int open(const char* path, int) noexcept override {
-    if (run_folder_is_writable && std::string(path).starts_with("/run/")) return kLockDescriptor;
-    if (std::string(path) != "/dev/ptp0" && std::string(path) != "/dev/ptp_nic") return -ENOENT;
-    return phc_open_errno != 0 ? -phc_open_errno : kPhcDescriptor;
+    const std::string name = path;
+    if (run_folder_is_writable && name.starts_with("/run/")) {
+      return name.find("realtime") != std::string::npos ? kLockDescriptor : kLockDescriptor + 1;
+    }
+    const bool other_node = name == "/dev/ptp_node";
+    if (name != "/dev/ptp0" && name != "/dev/ptp_nic" && !other_node) return -ENOENT;
+    if (phc_open_errno != 0) return -phc_open_errno;
+    return other_node ? kOtherPhcDescriptor : kPhcDescriptor;
   }
   int hold_name(const char* name) noexcept override {
     return held_names.insert(name).second ? 900 : -EADDRINUSE;
   }
   int lock(int fd) noexcept override {
     return held_names.insert("descriptor " + std::to_string(fd)).second ? 0 : -EWOULDBLOCK;
+  }
+  std::int64_t device_number(int fd) noexcept override {
+    constexpr std::int64_t kNumber = 0xF800;
+    const bool is_phc = fd == kPhcDescriptor || fd == kOtherPhcDescriptor;
+    return is_phc && device_numbers_known ? kNumber : 0;
   }
   int set_timer(int, std::int64_t ns) noexcept override {
     timer_ns = ns;
@@ -117,7 +128,8 @@ class FakeClocks final : public FakeKernel {
     return TIME_OK;
   }
   int control(int fd, unsigned long request, void* argument) noexcept override {
-    if (fd != kPhcDescriptor) return FakeKernel::control(fd, request, argument);
+    if (fd != kPhcDescriptor && fd != kOtherPhcDescriptor)
+      return FakeKernel::control(fd, request, argument);
     if (phc_gone) return -ENODEV;
     switch (request) {
       case PTP_CLOCK_GETCAPS:
@@ -134,7 +146,8 @@ class FakeClocks final : public FakeKernel {
     }
   }
 
-  static constexpr int kPhcDescriptor = 800;  ///< /dev/ptp0, and /dev/ptp_nic, a link to it
+  static constexpr int kPhcDescriptor = 800;       ///< /dev/ptp0, and /dev/ptp_nic, a link to it
+  static constexpr int kOtherPhcDescriptor = 810;  ///< /dev/ptp_node: made for it by mknod
   static constexpr int kLockDescriptor = 801;
 
  private:

@@ -189,6 +189,7 @@ class FakeKernel : public Kernel {
   int set_timer(int, std::int64_t) noexcept override { return 0; }
   int hold_name(const char*) noexcept override { return next_descriptor_++; }
   int lock(int) noexcept override { return 0; }
+  std::int64_t device_number(int) noexcept override { return 0; }
 
  private:
   static void write_stamps(const Packet& packet, msghdr& message) {

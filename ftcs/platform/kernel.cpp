@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <sys/timerfd.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -107,6 +108,12 @@ int LinuxKernel::hold_name(const char* name) noexcept {
 }
 
 int LinuxKernel::lock(int fd) noexcept { return or_errno(::flock(fd, LOCK_EX | LOCK_NB)); }
+
+std::int64_t LinuxKernel::device_number(int fd) noexcept {
+  struct stat status {};
+  if (::fstat(fd, &status) != 0 || !S_ISCHR(status.st_mode)) return 0;
+  return static_cast<std::int64_t>(status.st_rdev);
+}
 
 Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
   if (this != &other) {

@@ -52,6 +52,8 @@ class Kernel {
   /// Takes what is open there, file or device, for this process, until the descriptor is closed.
   /// -EWOULDBLOCK: another one has it, under whatever name it was opened.
   [[nodiscard]] virtual int lock(int fd) noexcept = 0;
+  /// Which device is open there, whatever its node is called (st_rdev); 0: none, or not known.
+  [[nodiscard]] virtual std::int64_t device_number(int fd) noexcept = 0;
 
  protected:
   Kernel() = default;
@@ -81,6 +83,7 @@ class LinuxKernel final : public Kernel {
   [[nodiscard]] int set_timer(int fd, std::int64_t from_now_ns) noexcept override;
   [[nodiscard]] int hold_name(const char* name) noexcept override;
   [[nodiscard]] int lock(int fd) noexcept override;
+  [[nodiscard]] std::int64_t device_number(int fd) noexcept override;
 };
 
 /// Owns a file descriptor.

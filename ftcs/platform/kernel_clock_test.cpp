@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
+#include <sys/stat.h>
 
 #include <gtest/gtest.h>
 
@@ -358,6 +359,53 @@ TEST(ClockDevice, another_name_is_no_other_clock) {
   const auto link = ClockDevice::open_phc(kernel, "/dev/ptp_nic", ClockAccess::kSteer);
   ASSERT_FALSE(link.ok());
   EXPECT_EQ(link.error().message(), "/dev/ptp_nic: already in use by another program");
+  const auto node = ClockDevice::open_phc(kernel, "/dev/ptp_node", ClockAccess::kSteer);
+  ASSERT_FALSE(node.ok()) << "another node of the same device";
+  EXPECT_EQ(node.error().message(), "/dev/ptp_node: already in use by another program");
+  kernel.held_names.erase("ftcs clock ptp-248-0");  // as seen from another network namespace
+  EXPECT_FALSE(ClockDevice::open_phc(kernel, "/dev/ptp_node", ClockAccess::kSteer).ok());
+  EXPECT_TRUE(ClockDevice::open_system(kernel, ClockAccess::kSteer).ok()) << "is another clock";
+}
+
+TEST(ClockDevice, is_recognised_by_the_device_and_only_for_want_of_that_by_the_name) {
+  for (const bool known : {true, false}) {
+    FakeClocks kernel;
+    kernel.device_numbers_known = known;
+    const auto open = [&](const char* path) {
+      return ClockDevice::open_phc(kernel, path, ClockAccess::kRead);
+    };
+    const auto clock = open("/dev/ptp0");
+    const auto system = ClockDevice::open_system(kernel, ClockAccess::kRead);
+    ASSERT_TRUE(clock.ok() && system.ok());
+    EXPECT_TRUE(clock->is_same_clock(*open("/dev/ptp0")));
+    EXPECT_EQ(clock->is_same_clock(*open("/dev/ptp_node")), known);
+    EXPECT_EQ(clock->is_same_clock(*open("/dev/ptp_nic")), known);
+    EXPECT_FALSE(clock->is_same_clock(*system));
+    EXPECT_TRUE(system->is_same_clock(*system));
+  }
+}
+
+TEST(LinuxKernel, a_device_has_one_number_whatever_leads_to_it) {
+  LinuxKernel kernel;
+  const auto number = [&](const std::string& path) {
+    const Descriptor device(kernel, kernel.open(path.c_str(), O_RDONLY));
+    return device.is_open() ? kernel.device_number(device.get()) : -1;
+  };
+  const std::int64_t null = number("/dev/null");
+  EXPECT_GT(null, 0);
+  EXPECT_NE(null, number("/dev/zero"));
+  std::string folder = (std::filesystem::temp_directory_path() / "ftcs-node-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  EXPECT_EQ(number(folder), 0) << "no device";
+  std::filesystem::create_symlink("/dev/null", folder + "/link");
+  EXPECT_EQ(number(folder + "/link"), null);
+  struct stat status {};
+  ASSERT_EQ(::stat("/dev/null", &status), 0);
+  const bool made = ::mknod((folder + "/node").c_str(), S_IFCHR | 0600, status.st_rdev) == 0;
+  const std::int64_t of_node = made ? number(folder + "/node") : -1;
+  std::filesystem::remove_all(folder);
+  if (of_node < 0) GTEST_SKIP() << "nodes can be made or opened only as root, outside of nodev";
+  EXPECT_EQ(of_node, null);
 }
 
 TEST(ClockDevice, the_system_clock_is_one_in_all_network_namespaces) {

@@ -82,6 +82,14 @@ Result<InterfaceCapabilities, OsError> interface_capabilities(Kernel& kernel, in
   return capabilities;
 }
 
+Result<InterfaceCapabilities, OsError> interface_capabilities(Kernel& kernel,
+                                                              const std::string& name) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return os_error(-fd, "socket");
+  const Descriptor socket(kernel, fd);
+  return interface_capabilities(kernel, fd, name);
+}
+
 std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd, const std::string& name) {
   ifreq request = request_for(name);
   request.ifr_addr.sa_family = AF_INET;
@@ -115,10 +123,7 @@ std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const 
 
 Result<std::array<std::uint8_t, 6>, OsError> identity_address(Kernel& kernel,
                                                               const std::string& name) {
-  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
-  if (fd < 0) return os_error(-fd, "socket");
-  const Descriptor socket(kernel, fd);
-  const auto capabilities = interface_capabilities(kernel, fd, name);
+  const auto capabilities = interface_capabilities(kernel, name);
   if (!capabilities) return capabilities.error();
   std::array<std::uint8_t, 6> address = capabilities->mac;
   if (address == std::array<std::uint8_t, 6>{}) {

@@ -35,6 +35,9 @@ struct InterfaceCapabilities {
                                                               const std::string& name);
 [[nodiscard]] Result<InterfaceCapabilities, OsError> interface_capabilities(
     Kernel& kernel, int fd, const std::string& name);
+/// With a socket of its own.
+[[nodiscard]] Result<InterfaceCapabilities, OsError> interface_capabilities(
+    Kernel& kernel, const std::string& name);
 /// No value: it has an IPv4 address. Else the reason.
 [[nodiscard]] std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd,
                                                           const std::string& name);

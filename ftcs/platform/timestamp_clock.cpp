@@ -75,12 +75,7 @@ TimestampClock::RealtimeReading TimestampClock::read_realtime() noexcept {
 Result<std::unique_ptr<TimestampClock>, OsError> TimestampClock::open(Kernel& kernel,
                                                                       const std::string& interface,
                                                                       TimestampMode mode) {
-  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
-  if (fd < 0) return os_error(-fd, "socket");
-  const Descriptor socket(kernel, fd);
-  const auto state = interface_state(kernel, fd, interface);
-  if (!state) return state.error();
-  const auto capabilities = interface_capabilities(kernel, fd, interface);
+  const auto capabilities = interface_capabilities(kernel, interface);
   if (!capabilities) return capabilities.error();
 
   const auto without_hardware = [&] {

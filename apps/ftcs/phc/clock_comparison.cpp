@@ -12,7 +12,11 @@ using platform::CrossTimestamper;
 Result<ClockComparison, std::string> ClockComparison::make(platform::Kernel& kernel,
                                                            const ClockDevice& source,
                                                            const ClockDevice& sink) {
-  if (source.name() == sink.name()) return source.name() + ": source and sink are the same clock";
+  if (source.is_same_clock(sink)) {
+    const std::string& name = source.name();
+    if (name == sink.name()) return name + ": source and sink are the same clock";
+    return name + " and " + sink.name() + ": source and sink are the same clock by two names";
+  }
   ClockComparison comparison;
   const auto add = [&](const ClockDevice& device, std::optional<CrossTimestamper>& timestamper) {
     if (device.is_system()) return true;

@@ -187,6 +187,13 @@ TEST(PhcRunner, says_what_cannot_be_opened_and_touches_nothing) {
   EXPECT_EQ(error(), "CLOCK_REALTIME: source and sink are the same clock");
   world.kernel.held_names.clear();
   world.options.source = "/dev/ptp0";
+  for (const char* other : {"/dev/ptp_nic", "/dev/ptp_node"}) {
+    world.options.sink = other;
+    EXPECT_EQ(error(), "/dev/ptp0 and " + std::string(other) +
+                           ": source and sink are the same clock by two names");
+    world.kernel.held_names.clear();
+  }
+  world.options.sink = "CLOCK_REALTIME";
   world.kernel.precise_errno = world.kernel.extended_errno = world.kernel.basic_errno = ENOTTY;
   EXPECT_NE(error().find("cannot compare"), std::string::npos);
   world.kernel.held_names = {"ftcs clock realtime"};
