@@ -37,6 +37,8 @@ std::vector<experiment::Scenario> parse_all(const std::vector<ExperimentFile>& f
 }
 
 int compare_log(const CompareOptions& options) {
+  const SweepOptions& files = options.sweep;
+  if (!can_write_results({files.json, files.csv, files.html})) return kRuntimeError;
   auto log = experiment::read_recorded_log(options.log);
   if (!log) {
     fmt::print(stderr, "ftcs: {}\n", log.error().text());
@@ -45,7 +47,6 @@ int compare_log(const CompareOptions& options) {
   LogComparison comparison{options.log, std::move(*log), {}};
   comparison.servos = experiment::replay_log(comparison.log);
   if (!options.sweep.quiet) fmt::print("{}", log_console(comparison));
-  const SweepOptions& files = options.sweep;
   bool written =
       files.json.empty() || write_result(files.json, dump(log_json(comparison, FTCS_VERSION)));
   written &= files.csv.empty() || write_result(files.csv, log_table(comparison).to_csv());

@@ -10,9 +10,9 @@
 #include "apps/ftcs/demo.h"
 #include "apps/ftcs/demo_ethercat.h"
 #include "apps/ftcs/number_check.h"
+#include "apps/ftcs/output.h"
 #include "apps/ftcs/ptp_transmitter.h"
 #include "apps/ftcs/units.h"
-#include "ftcs/report/write_file.h"
 
 namespace ftcs::app {
 namespace {
@@ -162,14 +162,8 @@ int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
 
 int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResult* result,
                 const EthercatDemo* ethercat) {
-  bool written = true;
-  const auto write = [&written](const std::string& file, const std::string& content) {
-    const auto error = write_file(file, content);
-    if (error) fmt::print(stderr, "ftcs demo: {}\n", error->message);
-    written &= !error;
-  };
-  if (!files.json.empty()) write(files.json, demo_json(demo, result, ethercat));
-  if (!files.html.empty()) write(files.html, demo_html(demo, result, ethercat));
+  bool written = files.json.empty() || write_result(files.json, demo_json(demo, result, ethercat));
+  written &= files.html.empty() || write_result(files.html, demo_html(demo, result, ethercat));
   if (!files.html.empty() && written) fmt::print("\nreport: {}\n", files.html);
   return written ? kSuccess : kRuntimeError;
 }
@@ -177,6 +171,7 @@ int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResul
 }  // namespace
 
 int run_demo(const DemoOptions& demo, const DemoFiles& files) {
+  if (!can_write_results({files.json, files.html})) return kRuntimeError;
   DemoResult result;
   if (demo.ptp) {
     if (const int code = run_ptp_demo(demo, result); code != kSuccess) return code;

@@ -19,4 +19,15 @@ bool write_result(const std::string& path, const std::string& content) {
   return true;
 }
 
+bool can_write_results(std::initializer_list<std::string> paths) {
+  for (const std::string& path : paths) {
+    if (path.empty() || path == "-") continue;
+    if (const auto error = check_writable(path)) {
+      fmt::print(stderr, "ftcs: {}\n", error->message);
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace ftcs::app

@@ -133,6 +133,10 @@ void add_paper_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
+    if (!can_write_results({options->json, options->csv, options->html})) {
+      exit_code = kRuntimeError;
+      return;
+    }
     exit_code = options->section == "5" ? reproduce_section5(*options) : reproduce(*options);
   });
 }

@@ -129,6 +129,9 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
         fmt::format("--trace follows one scenario, {} were given", scenarios.size()));
   }
   const experiment::Shard shard = parse_shard(options.shard);
+  if (!can_write_results({options.json, options.csv, options.html, options.trace})) {
+    return kRuntimeError;
+  }
   const Interrupt interrupt;
   SweepResult sweep;
   if (!options.merge.empty()) {

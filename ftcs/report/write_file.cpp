@@ -24,6 +24,13 @@ int write_whole(const std::filesystem::path& path, std::string_view content) {
   return code;
 }
 
+/// What write_file() writes to first.
+std::filesystem::path part_of(const std::filesystem::path& path) {
+  std::filesystem::path part = path;
+  part += ".part";
+  return part;
+}
+
 }  // namespace
 
 std::optional<WriteError> write_file(const std::filesystem::path& path, std::string_view content) {
@@ -34,8 +41,7 @@ std::optional<WriteError> write_file(const std::filesystem::path& path, std::str
     if (code != 0) return failure(path, code);
     return std::nullopt;
   }
-  std::filesystem::path part = path;
-  part += ".part";
+  const std::filesystem::path part = part_of(path);
   if (const int code = write_whole(part, content); code != 0) {
     std::filesystem::remove(part, ignored);
     return failure(path, code);
@@ -46,6 +52,23 @@ std::optional<WriteError> write_file(const std::filesystem::path& path, std::str
     std::filesystem::remove(part, ignored);
     return failure(path, problem.value());
   }
+  return std::nullopt;
+}
+
+std::optional<WriteError> check_writable(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_directory(status)) return failure(path, EISDIR);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    return std::nullopt;
+  }
+  const std::filesystem::path part = part_of(path);
+  const bool was_there = std::filesystem::exists(part, ignored);
+  errno = 0;
+  std::FILE* const file = std::fopen(part.c_str(), "ab");  // appends: leaves what is there
+  if (file == nullptr) return failure(path, errno);
+  std::fclose(file);
+  if (!was_there) std::filesystem::remove(part, ignored);
   return std::nullopt;
 }
 

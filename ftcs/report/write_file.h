@@ -20,4 +20,8 @@ struct WriteError {
 [[nodiscard]] std::optional<WriteError> write_file(const std::filesystem::path& path,
                                                    std::string_view content);
 
+/// Before a long run: would write_file() fail here already now? Nothing that exists is touched. A
+/// disk can still fill up until then; a device or a pipe is not tried.
+[[nodiscard]] std::optional<WriteError> check_writable(const std::filesystem::path& path);
+
 }  // namespace ftcs

@@ -67,5 +67,25 @@ TEST_F(WriteFile, keeps_the_older_result_when_the_disk_is_full) {
   EXPECT_EQ(content(folder_ / "x"), "finished");
 }
 
+TEST_F(WriteFile, tells_beforehand_what_would_fail) {
+  const auto missing = check_writable(folder_ / "missing" / "x");
+  ASSERT_TRUE(missing.has_value());
+  EXPECT_NE(missing->message.find("missing/x: No such file or directory"), std::string::npos);
+  const auto folder = check_writable(folder_);
+  ASSERT_TRUE(folder.has_value());
+  EXPECT_NE(folder->message.find("Is a directory"), std::string::npos);
+  EXPECT_FALSE(check_writable("/dev/null").has_value());
+}
+
+TEST_F(WriteFile, asking_beforehand_changes_nothing) {
+  EXPECT_FALSE(check_writable(folder_ / "new").has_value());
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+  EXPECT_FALSE(write_file(folder_ / "x", "finished").has_value());
+  EXPECT_FALSE(write_file(folder_ / "x.part", "of somebody else").has_value());
+  EXPECT_FALSE(check_writable(folder_ / "x").has_value());
+  EXPECT_EQ(content(folder_ / "x"), "finished");
+  EXPECT_EQ(content(folder_ / "x.part"), "of somebody else");
+}
+
 }  // namespace
 }  // namespace ftcs

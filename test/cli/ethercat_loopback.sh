@@ -54,6 +54,18 @@ short=(--drift-pulses 200 --duration 2)
 "$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" --csv "$folder/none/x.csv" > "$folder/csv" 2>&1
 [ $? -eq 1 ] && grep -q "cannot write .*x.csv: No such file" "$folder/csv" || fail "CSV in a folder that is not there"
 grep -q "scan" "$folder/csv" && fail "CSV in a folder that is not there: the drives were touched"
+for flag in --json --html; do
+  "$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" $flag "$folder/none/x" > "$folder/unwritable" 2>&1
+  [ $? -eq 1 ] && grep -q "cannot write .*none/x: No such file" "$folder/unwritable" || fail "$flag in a folder that is not there"
+  grep -q "scan" "$folder/unwritable" && fail "$flag in a folder that is not there: the drives were touched"
+done
+"$ftcs" ethercat-segment --udp $((port + 2)) --duration 60 --json "$folder/none/x" > "$folder/unwritable" 2>&1
+[ $? -eq 1 ] && grep -q "cannot write .*none/x: No such file" "$folder/unwritable" || fail "segment: JSON in a folder that is not there"
+echo precious > "$folder/old.csv"
+"$ftcs" ethercat run --udp "127.0.0.1:$((port + 2))" --csv "$folder/old.csv" > "$folder/unreached" 2>&1
+[ $? -eq 1 ] && [ "$(cat "$folder/old.csv")" = precious ] || fail "a run that never began cost the record before"
+"$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" -q --csv "$folder/old.csv" > "$folder/recorded" 2>&1
+head -n 1 "$folder/old.csv" | grep -q "^cycle,state," && [ "$(wc -l < "$folder/old.csv")" -gt 100 ] || fail "CSV: the record is not there"
 mkdir "$folder/record"
 mkfifo "$folder/record/pipe"
 head -n 20 "$folder/record/pipe" > "$folder/lines" &

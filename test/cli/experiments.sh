@@ -59,6 +59,32 @@ expect 1 'empty.toml: no line of a known format' compare --log empty.toml
 expect 1 'binary.toml' compare --log binary.toml
 expect 1 'No space left on device' simulate good.toml -q --json /dev/full
 
+# Results that cannot be written are known before anything runs (these runs would take hours or minutes), and
+# what exists stays until there is something to write.
+sed 's/seeds = 5/seeds = 1000000/' good.toml > endless.toml
+for flag in --json --csv --html --trace; do
+  expect 1 'cannot write none/x: No such file or directory' simulate endless.toml $flag none/x
+  [ -s out ] && fail "$flag none/x: the run began"
+done
+for flag in --json --csv --html; do
+  expect 1 'cannot write none/x: No such file or directory' compare endless.toml $flag none/x
+  expect 1 'cannot write .: Is a directory' compare endless.toml $flag .
+  expect 1 'cannot write none/x: No such file or directory' compare --log good.toml $flag none/x
+  expect 1 'cannot write none/x: No such file or directory' analyse good.toml $flag none/x
+  expect 1 'cannot write none/x: No such file or directory' paper --seeds 1000000 $flag none/x
+  expect 1 'cannot write none/x: No such file or directory' paper --section 5 --seeds 1000000 $flag none/x
+  [ -s out ] && fail "paper $flag none/x: the run began"
+done
+for flag in --json --html; do
+  expect 1 'cannot write none/x: No such file or directory' demo --duration 3 $flag none/x
+  [ -s out ] && fail "demo $flag none/x: the run began"
+done
+echo precious > old.json
+expect 1 'none.log' compare --log none.log --json old.json
+(timeout -s KILL 1 "$ftcs" simulate endless.toml -q --json old.json) > /dev/null 2>&1
+[ "$(cat old.json)" = precious ] || fail "a run without a result cost the older one"
+rm -f old.json.part
+
 # Logs and records: cut off in the middle, compressed and cut off, no text at all.
 for i in $(seq 400); do echo "$i,$((i * 20000))"; done > data
 { echo "time_s,offset_ns"; cat data; } > good.csv

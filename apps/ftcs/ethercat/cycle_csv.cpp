@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -11,12 +12,23 @@ namespace ftcs::app {
 
 std::optional<WriteError> CycleCsv::open(const std::string& path) {
   path_ = path;
-  file_.reset(std::fopen(path.c_str(), "w"));
+  file_.reset(std::fopen(path.c_str(), "a"));
+  check(is_open());
+  return error_;
+}
+
+void CycleCsv::begin() {
+  if (!is_open()) return;
+  std::error_code problem;
+  if (std::filesystem::is_regular_file(path_, problem)) {
+    std::filesystem::resize_file(path_, 0, problem);
+    errno = problem.value();
+    check(!problem);
+  }
   constexpr const char* kHeader =
       "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,working_counter,"
       "margin_ns,skipped\n";
-  check(is_open() && std::fputs(kHeader, file_.get()) >= 0 && std::fflush(file_.get()) == 0);
-  return error_;
+  if (is_open()) check(std::fputs(kHeader, file_.get()) >= 0 && std::fflush(file_.get()) == 0);
 }
 
 void CycleCsv::check(bool good) {

@@ -16,8 +16,10 @@ namespace ftcs::app {
 /// moving.
 class CycleCsv {
  public:
-  /// Before the drives are touched.
+  /// Before the drives are touched: what the file holds stays until begin().
   [[nodiscard]] std::optional<WriteError> open(const std::string& path);
+  /// Before the first cycle, of a record that is open.
+  void begin();
   [[nodiscard]] bool is_open() const { return file_ != nullptr; }
   void write(std::uint64_t cycle, const CycleDecision& decision, const CycleSample& sample,
              std::uint16_t working_counter, std::int64_t margin_ns);

@@ -8,6 +8,7 @@
 #include "apps/ftcs/ethercat/cycle_laws.h"
 #include "apps/ftcs/ethercat/main_runner.h"
 #include "apps/ftcs/ethercat/run_html.h"
+#include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/report/write_file.h"
@@ -159,6 +160,7 @@ std::optional<WriteError> write_reports(const MainRunner& runner) {
 
 int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const RunOptions& options = runner.options();
+  if (!can_write_results({options.json, options.html})) return kRuntimeError;
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);

@@ -114,6 +114,7 @@ void MainRunner::reserve_trace() {
 }
 
 void MainRunner::run(const std::function<bool()>& stop) {
+  csv_.begin();
   axes_.resize(main_->network().count);
   reserve_trace();
   unlocked_limit_ = static_cast<std::uint64_t>(options_.unlocked_limit_s * 1e9 /

@@ -7,9 +7,9 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/ethercat/segment_server.h"
+#include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/platform/stop_flag.h"
-#include "ftcs/report/write_file.h"
 
 namespace ftcs::app {
 
@@ -98,6 +98,7 @@ int run_segment(SegmentArguments arguments) {
     return kUsageError;
   }
   const SegmentOptions& options = arguments.options;
+  if (!can_write_results({options.json})) return kRuntimeError;
   auto link = options.interface.empty()
                   ? platform::EthercatLink::listen_udp(options.address, options.port)
                   : platform::EthercatLink::open_raw(options.interface);
@@ -117,11 +118,7 @@ int run_segment(SegmentArguments arguments) {
   server.run([&stop] { return stop.is_set(); });
   server.print_summary();
   if (options.json.empty()) return kSuccess;
-  if (const auto error = write_file(options.json, server.json())) {
-    fmt::print(stderr, "ftcs ethercat-segment: {}\n", error->message);
-    return kRuntimeError;
-  }
-  return kSuccess;
+  return write_result(options.json, server.json()) ? kSuccess : kRuntimeError;
 }
 
 }  // namespace
