@@ -119,6 +119,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
   }
   std::optional<std::string> failure;
   if (forward) {
+    refused_syncs_ = used ? 0 : refused_syncs_ + 1;
     SampleRecord record;
     record.time_s = time_s;
     record.offset_known = telemetry.servo.offset_known;
@@ -156,7 +157,10 @@ void ClockFollower::on_silence() {
   const Telemetry telemetry = discipline_.on_silence();
   const bool holdover = telemetry.servo.state == ServoState::kHoldover;
   if (holdover && !in_holdover_) {
-    log_(LogLevel::kWarning, "{}: no Sync for a while; keeping the last rate (holdover)", label_);
+    const std::string what = refused_syncs_ == 0
+                                 ? "no Sync"
+                                 : fmt::format("{} Syncs refused, no good one", refused_syncs_);
+    log_(LogLevel::kWarning, "{}: {} for a while; keeping the last rate (holdover)", label_, what);
   }
   in_holdover_ = holdover;
   follow_lock(telemetry.reading.free_running);

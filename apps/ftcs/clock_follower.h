@@ -85,6 +85,7 @@ class ClockFollower {
   SampleSummary recent_;
   SampleSummary since_lock_;
   bool in_holdover_ = false;
+  std::uint32_t refused_syncs_ = 0;  ///< in a row
   bool clock_refuses_ = false;
   Status status_;
   FreeRunningTime last_used_{};

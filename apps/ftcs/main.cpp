@@ -30,7 +30,8 @@ int run(int argc, char** argv) {
     return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })
                 .empty();
   };
-  if (argc > 1 && argv[1][0] != '-' && !is_command(argv[1])) {
+  const bool has_command = argc > 1 && is_command(argv[1]);
+  if (argc > 1 && argv[1][0] != '-' && !has_command) {
     fmt::print(stderr, "ftcs: unknown command '{}' (see ftcs --help)\n", argv[1]);
     return kUsageError;
   }
@@ -39,7 +40,8 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& request) {  // --help, --version
     return app.exit(request);
   } catch (const CLI::Error& error) {
-    fmt::print(stderr, "ftcs: {} (see ftcs --help)\n", error.what());
+    const std::string name = has_command ? fmt::format("ftcs {}", argv[1]) : "ftcs";
+    fmt::print(stderr, "{}: {} (see {} --help)\n", name, error.what(), name);
     return kUsageError;
   }
   return exit_code;

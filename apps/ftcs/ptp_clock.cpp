@@ -49,7 +49,13 @@ Result<PtpClocks, std::string> open_ptp_clocks(platform::Kernel& kernel, const P
                                                Log& log) {
   if (auto wrong = contradiction(options)) return std::move(*wrong);
   auto timestamps = platform::TimestampClock::open(kernel, options.interface, mode_for(options));
-  if (!timestamps) return timestamps.error().message();
+  if (!timestamps) {
+    const platform::OsError& error = timestamps.error();
+    const bool asked = error.kind == platform::OsErrorKind::kTimestampingUnsupported &&
+                       options.clock == ClockKind::kVirtual &&
+                       options.timestamps == TimestampMode::kHardware;
+    return error.message() + (asked ? "; -S takes software ones" : "");
+  }
   PtpClocks clocks{std::move(*timestamps)};
   if (options.clock == ClockKind::kVirtual) return clocks;
 

@@ -116,6 +116,13 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
 
 int PtpReceiver::finish() {
   follower_.log_summary();
+  if (!had_transmitter_) {
+    log()(LogLevel::kNotice, "no time transmitter was found: domain {}, {}, transportSpecific {}",
+          options().domain, platform::name(options().socket.transport), options().major_sdo_id);
+  }
+  if (options().peer_to_peer() && !core().peer_delay().mean_link_delay()) {
+    log()(LogLevel::kNotice, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
+  }
   log_peer_delay(core().peer_delay());
   log_unusual(core().counters());
   return follower_.locked() ? kSuccess : kNotLocked;

@@ -181,11 +181,11 @@ void TimeReceiver::select(const TransmitterData& data, FreeRunningTime now,
   const bool changed = !had_transmitter_ || !same_reference(data, transmitter_);
   transmitter_ = data;
   has_transmitter_ = true;
-  had_transmitter_ = true;
   if (changed) {
-    port_.count(Counter::kTransmitterChanges);
+    if (had_transmitter_) port_.count(Counter::kTransmitterChanges);
     servo_locked_ = false;  // locked to something else
   }
+  had_transmitter_ = true;
   port_.push(TransmitterSelected{data, changed}, actions);
   if (same_port) return;
   if (!measured) forget_exchanges();

@@ -31,6 +31,7 @@ config() { printf '%s\n' "$@" > "$folder/ptp.conf"; }
 expect 2 "unknown command 'follow'" follow
 expect 2 "subcommand is required"
 expect 2 "--bogus" ptp --bogus
+expect 2 "(see ftcs ptp --help)" ptp --bogus
 expect 2 "no interface" ptp
 expect 2 "only one port" ptp -i lo -i eth0
 expect 2 "expected virtual, system, phc, /dev/ptpN or auto" ptp -i lo --clock realtime
@@ -93,6 +94,7 @@ expect 2 "ptp.conf:1: section 'unicast_master_table' is not supported" ptp -i lo
 
 expect 1 "interface nosuch0: no such device" ptp -i nosuch0
 expect 1 "hardware time stamping on lo" ptp -i lo -H
+expect 1 "; -S takes software ones" ptp -i lo -H
 
 # Sockets and sources.
 expect 1 "socket $folder/none/ftcs: No such file" ptp -i lo --event-port 20319 --general-port 20320 --uds_address "$folder/none/ftcs"
@@ -137,6 +139,15 @@ if [ "$code" -ne 3 ]; then
   failures=$((failures + 1))
 fi
 holder=
+
+# Nobody there: the last lines say where was listened.
+"$ftcs" ptp -i lo "${ports[@]}" --domainNumber 7 -P --duration 0.3 > "$folder/out"
+for text in "no time transmitter was found: domain 7, UDPv4, transportSpecific 0" "no peer delay: the neighbour"; do
+  grep -qF "$text" "$folder/out" && continue
+  echo "FAILED: nobody there, expected '$text'; got:"
+  cat "$folder/out"
+  failures=$((failures + 1))
+done
 
 # What could not be written is an error, whatever was measured.
 if [ -w /dev/full ]; then

@@ -93,7 +93,7 @@ check_receiver() {  # exit code, seconds
   grep -v "master offset" "$folder/receiver.log" || true
   [ "$code" -eq 0 ] || fail "exit code $code: not locked"
   [ -s "$folder/errors.log" ] && fail "error lines"
-  grep -qE "no transmit timestamp|FAULTY|no Sync" "$folder/receiver.log" && fail "fault lines"
+  grep -qE "no transmit timestamp|FAULTY|no Sync|no good one" "$folder/receiver.log" && fail "fault lines"
   grep -qE "LISTENING to UNCALIBRATED on RS_SLAVE" "$folder/receiver.log" || fail "no transmitter selected"
 
   # Eight Syncs a second, less the start, which takes up to five seconds.
