@@ -43,6 +43,8 @@ struct DemoResult {
   double sync_interval_ns = 0.0;
   double lock_band_ns = 0.0;   ///< common to all servos: 5 x 1.4826 x MAD of the link's t2 - t1
   double link_delay_ns = 0.0;  ///< median of t2 - t1 on the common oscillator
+  /// Half the difference of the two ways' medians: the part of the true error that nobody can see.
+  double asymmetry_ns = 0.0;
   std::uint64_t samples = 0;
   bool interrupted = false;  ///< stopped before its time was up
   std::vector<TrialResult> servos;
@@ -71,7 +73,9 @@ class DemoReceiver final : public PtpCorePort<ptp::TimeReceiver> {
   platform::ChildProcess* transmitter_;
   TrueReference truth_;
   std::vector<std::unique_ptr<ServoTrial>> trials_;
-  std::vector<double> one_way_ns_;  // t2 - t1 of every Sync, both on the common oscillator
+  // t2 - t1 of every Sync and t4 - t3 of every answered request, on the common oscillator.
+  std::vector<double> one_way_ns_;
+  std::vector<double> way_back_ns_;
   LiveView view_;
   bool interrupted_ = false;
 };

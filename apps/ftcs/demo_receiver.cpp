@@ -77,9 +77,12 @@ void DemoReceiver::act(const ptp::Action& action) {
 
 void DemoReceiver::on_pair(const EventPair& pair) {
   for (const auto& trial : trials_) trial->on_pair(pair);
-  if (pair.direction != Direction::kForward) return;
-  const ReferenceTime arrival = truth_.at(oscillator().to_underlying(pair.free_running));
-  one_way_ns_.push_back((arrival - pair.reference).ns());
+  const ReferenceTime ours = truth_.at(oscillator().to_underlying(pair.free_running));
+  if (pair.direction != Direction::kForward) {
+    way_back_ns_.push_back((pair.reference - ours).ns());
+    return;
+  }
+  one_way_ns_.push_back((ours - pair.reference).ns());
   draw();
 }
 
@@ -116,6 +119,9 @@ DemoResult DemoReceiver::result() const {
   DemoResult result;
   result.sync_interval_ns = sync_interval(demo_).ns();
   result.link_delay_ns = one_way.median;
+  if (!way_back_ns_.empty()) {
+    result.asymmetry_ns = (one_way.median - summarize(way_back_ns_).median) / 2;
+  }
   result.lock_band_ns = kBandInSigma * kSigmaPerMad * one_way.median_absolute_deviation;
   result.samples = one_way_ns_.size();
   result.interrupted = interrupted_;

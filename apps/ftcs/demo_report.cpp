@@ -49,6 +49,7 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
   root["max_frequency_ppb"] = options.max_frequency_ppb;
   root["timestamps"] = result.timestamps;
   root["link_delay_ns"] = result.link_delay_ns;
+  root["asymmetry_ns"] = result.asymmetry_ns;
   root["lock_band_ns"] = result.lock_band_ns;
   root["ptp"] = Json::array();
   for (const TrialResult& servo : result.servos) {
@@ -61,6 +62,7 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
     row["rms_perceived_offset_ns"] = servo.rms_perceived_offset_ns;
     row["rms_time_error_ns"] = servo.rms_time_error_ns;
     row["rms_second_half_ns"] = servo.rms_second_half_ns;
+    row["mean_second_half_ns"] = servo.mean_second_half_ns;
     row["rate_error_ppb"] = servo.rate_error_ppb;
     row["final_time_error_ns"] = servo.final_time_error_ns;
     row["samples"] = servo.samples;

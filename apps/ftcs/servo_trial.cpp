@@ -9,11 +9,13 @@
 namespace ftcs::app {
 namespace {
 
-double rms(std::span<const double> values) {
+RunningStatistics statistics_of(std::span<const double> values) {
   RunningStatistics statistics;
   for (const double value : values) statistics.add(value);
-  return statistics.rms();
+  return statistics;
 }
+
+double rms(std::span<const double> values) { return statistics_of(values).rms(); }
 
 template <class Values>
 std::span<const double> tail(const Values& values, std::size_t first) {
@@ -81,7 +83,9 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   result.rms_perceived_offset_ns = rms(tail(perceived_, from));
   result.rms_time_error_ns = rms(tail(true_between_, (from + 1) * kPointsPerInterval));
   const std::size_t half = true_at_samples_.size() / 2;
-  result.rms_second_half_ns = rms(tail(true_between_, (half + 1) * kPointsPerInterval));
+  const auto second_half = statistics_of(tail(true_between_, (half + 1) * kPointsPerInterval));
+  result.rms_second_half_ns = second_half.rms();
+  result.mean_second_half_ns = second_half.mean();
   result.rate_error_ppb = rms(tail(rate_error_ppb_, from));
   bool inside = true;
   for (const double offset : tail(true_at_samples_, from)) {

