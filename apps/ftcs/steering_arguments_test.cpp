@@ -51,7 +51,8 @@ TEST(SteeringArguments, nothing_given_limits_nothing) {
 }
 
 TEST(SteeringArguments, a_value_out_of_range_is_named_with_its_range) {
-  EXPECT_EQ(given("--max-frequency 0").wrong, "--max-frequency: 0 ppb: expected 1 to 9e+08 ppb");
+  EXPECT_EQ(given("--max-frequency 0.5ppb").wrong,
+            "--max-frequency: 0.5 ppb: expected 1 to 9e+08 ppb, or 0: the clock's own limit");
   EXPECT_EQ(given("--max-frequency-change=-1ppm").wrong,
             "--max-frequency-change: -1000 ppb: expected 0 to 9e+08 ppb");
   EXPECT_EQ(given("--frequency-granularity 200000ppm").wrong,
@@ -101,12 +102,20 @@ TEST(SteeringSettings, have_ptp4ls_units) {
   EXPECT_TRUE(options.steering.never_step);
 }
 
+TEST(SteeringSettings, a_max_frequency_of_zero_is_the_clocks_own_limit_as_with_ptp4l) {
+  PtpOptions options;
+  EXPECT_EQ(read_config_text("[global]\nmax_frequency 100\nmax_frequency 0\n", "ptp.conf", options),
+            std::nullopt);
+  EXPECT_EQ(options.servo.limits.fastest, RateLimits{}.fastest);
+}
+
 TEST(SteeringSettings, errors_name_file_line_and_range) {
   PtpOptions options;
   EXPECT_EQ(read_config_text("[global]\nmax_frequency_change -1\n", "ptp.conf", options),
             "ptp.conf:2: max_frequency_change: -1 ppb: expected 0 to 9e+08 ppb");
-  EXPECT_EQ(read_config_text("[global]\nmax_frequency 0\n", "ptp.conf", options),
-            "ptp.conf:2: max_frequency: 0 ppb: expected 1 to 9e+08 ppb");
+  EXPECT_EQ(read_config_text("[global]\nmax_frequency -1\n", "ptp.conf", options),
+            "ptp.conf:2: max_frequency: -1 ppb: expected 1 to 9e+08 ppb, or 0: the clock's own "
+            "limit");
   EXPECT_NE(read_config_text("[global]\nsteering_latency soon\n", "ptp.conf", options),
             std::nullopt);
 }

@@ -50,7 +50,7 @@ expect 2 "-O and --leapfile exclude each other" phc -s /dev/ptp0 -O 0 --leapfile
 expect 2 "only where CLOCK_REALTIME is steered" phc -s CLOCK_REALTIME -c eth0 --leapfile x
 expect 2 "'linreg' is not supported" phc -s /dev/ptp0 -O 0 -E linreg
 expect 2 "-P and -I are of the pi servo" phc -s /dev/ptp0 -O 0 -P 1
-expect 2 "--max-frequency: 0 ppb: expected 1 to 9e+08 ppb" phc -s /dev/ptp0 -O 0 --max-frequency 0
+expect 2 "--max-frequency: 0.5 ppb: expected 1 to 9e+08 ppb" phc -s /dev/ptp0 -O 0 --max-frequency 0.5ppb
 expect 2 "--steering-latency: '5' is no time" phc -s /dev/ptp0 -O 0 --steering-latency 5
 expect 2 "frequency_granularity: the servo linuxptp-pi cannot keep to it" phc -s /dev/ptp0 -O 0 -E pi --frequency-granularity 1ppb
 expect 2 "not finer than max_frequency_change" phc -s /dev/ptp0 -O 0 --max-frequency-change 1ppb --frequency-granularity 1ppb
