@@ -8,7 +8,6 @@
 //   message = source, sequence, flags, correction, interval, time (1 octet each)
 //
 // The last octet chooses the receiver's profile.
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,8 +15,7 @@
 #include <span>
 
 #include "ftcs/ptp/time_receiver.h"
-#include "ftcs/ptp/wire/byte_order.h"
-#include "test/fuzz/require.h"
+#include "test/fuzz/ptp_script.h"
 
 namespace ftcs::ptp {
 namespace {
@@ -26,21 +24,19 @@ using namespace std::chrono_literals;
 
 const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
 
-/// Longest pause between two deadlines that the timer test follows at one instant.
-constexpr int kTimersAtOnce = 64;
-
-class Script {
+class Script : PtpScript {
  public:
-  explicit Script(std::span<const std::uint8_t> octets) : octets_(octets), reader_(octets) {
-    receiver_ = TimeReceiver(profile(octets.empty() ? std::uint8_t{0} : octets.back()));
+  explicit Script(std::span<const std::uint8_t> octets)
+      : PtpScript(octets), config_(profile(octets.empty() ? std::uint8_t{0} : octets.back())) {
+    receiver_ = TimeReceiver(config_);
     check(receiver_.start(now_));
   }
 
   void run() {
-    while (reader_.offset() < octets_.size()) {
+    while (!ended()) {
       now_ = now_ + Duration{8ms * int{octet()}};
       step();
-      fire_timers();
+      fire_timers(receiver_, [this](const ActionList& actions) { check(actions); });
     }
   }
 
@@ -58,10 +54,9 @@ class Script {
     if ((bits & 64) != 0) {
       require(config.acceptable.add(ClockIdentity::from_mac({2, 0, 0, 0, 0, 2})), "there is room");
     }
+    config.major_sdo_id = (bits & 128) != 0 ? 1 : 0;
     return config;
   }
-
-  std::uint8_t octet() { return reader_.read<std::uint8_t>(); }
 
   void step() {
     switch (octet() % 24) {
@@ -112,11 +107,9 @@ class Script {
   }
 
   void raw_message() {
-    const std::size_t size = octet();
-    std::array<std::uint8_t, 255> bytes{};
-    for (std::size_t i = 0; i < size; ++i) bytes[i] = octet();
-    check(receiver_.on_event_message({bytes.data(), size}, stamp(), now_));
-    check(receiver_.on_general_message({bytes.data(), size}, now_));
+    const Raw message = raw();
+    check(receiver_.on_event_message(message.view(), stamp(), now_));
+    check(receiver_.on_general_message(message.view(), now_));
   }
   void event(const Message& message) {
     const auto bytes = encode(message);
@@ -135,9 +128,6 @@ class Script {
     const auto bytes = encode(message);
     if (bytes) check(receiver_.on_general_message(bytes->view(), now_));
   }
-  PortIdentity port() {
-    return {ClockIdentity::from_mac({2, 0, 0, 0, 0, static_cast<std::uint8_t>(octet() % 12)}), 1};
-  }
   Message message(const Body& body, bool answer = false) {
     Message message;
     message.body = body;
@@ -148,6 +138,9 @@ class Script {
     const std::uint8_t flags = octet();
     if ((flags & 1) != 0) message.header.flags |= flag::kTwoStep;
     if (flags > 250) message.header.flags |= flag::kAlternateTransmitter;
+    // Late: behind messages that were sent after it.
+    if (flags >= 240 && flags < 250) message.header.sequence_id -= flags - 239;
+    message.header.major_sdo_id = config_.major_sdo_id;
     message.header.correction = correction();
     message.header.log_interval = static_cast<std::int8_t>(octet());
     return message;
@@ -159,34 +152,11 @@ class Script {
     announce.steps_removed = octet();
     return message(announce);
   }
-  Duration correction() {
-    const std::uint8_t choice = octet();
-    if (choice < 64) return Duration::from_whole_ns(choice);
-    if (choice < 128) return Duration::from_whole_ns(-std::int64_t{choice});
-    return Duration::from_scaled_ns(std::int64_t{choice} << 55);
-  }
-  /// Near the right time, a jump away, or at an end of what a Timestamp can hold.
-  ReferenceTime time() {
-    const std::uint8_t choice = octet();
-    if (choice == 255) return ReferenceTime::from_ns(std::numeric_limits<std::int64_t>::max());
-    if (choice == 254) return {};
-    const Duration jump{1s * (choice > 200 ? int{choice} - 227 : 0)};
-    return ReferenceTime{now_.since_epoch() + jump + Duration{100us * int{choice}}};
-  }
   FreeRunningTime stamp() {
     const std::uint8_t choice = octet();
     if (choice == 255) return FreeRunningTime::from_ns(std::numeric_limits<std::int64_t>::max());
     if (choice == 254) return FreeRunningTime::from_ns(std::numeric_limits<std::int64_t>::min());
     return now_ - Duration{10us * int{choice}};
-  }
-
-  void fire_timers() {
-    for (int i = 0; i < kTimersAtOnce; ++i) {
-      const auto due = receiver_.deadline();
-      if (!due || *due > now_) return;
-      check(receiver_.on_timer(now_));
-    }
-    require(false, "timers at one instant come to an end");
   }
 
   void check(const ActionList& actions) {
@@ -220,6 +190,10 @@ class Script {
                            receiver_.state() == PortState::kTimeReceiver;
     require(receiver_.state() == state_, "each change of state is told");
     require(following == (receiver_.transmitter() != nullptr), "it follows whom it has selected");
+    const Rate rate = receiver_.grandmaster_rate_ratio().value_or(Rate{});
+    require(std::abs(rate.deviation()) < 0.2, "the grandmaster's rate is one");
+    const Duration delay = receiver_.peer_delay().mean_link_delay().value_or(Duration{});
+    require(abs(delay) <= Duration{2 * kMaximumPeerDelay}, "the link's delay is one");
     check_counters();
   }
   void check_pair(const EventPair& pair) {
@@ -232,21 +206,14 @@ class Script {
   }
   void check_counters() {
     const Counters& counters = receiver_.counters();
-    for (std::size_t i = 0; i < kCounters; ++i) {
-      const auto counter = static_cast<Counter>(i);
-      require(counters[counter] >= before_[counter], "counters only grow");
-    }
-    require(counters[Counter::kActionsDropped] == 0, "the list holds all actions");
+    require_growth(counters);
     require(counters[Counter::kForwardPairs] == forward_, "forward pairs are counted");
     require(counters[Counter::kBackwardPairs] == backward_, "backward pairs are counted");
     require(counters[Counter::kPeerDelays] == peer_delays_, "peer delays are counted");
-    before_ = counters;
   }
 
-  std::span<const std::uint8_t> octets_;
-  ByteReader reader_;
+  TimeReceiverConfig config_;
   TimeReceiver receiver_{TimeReceiverConfig{}};
-  FreeRunningTime now_ = FreeRunningTime{Duration{1h}};
   PortState state_ = PortState::kInitializing;
   std::uint16_t sequence_ = 0;
   std::uint16_t last_request_ = 0;
@@ -254,7 +221,6 @@ class Script {
   std::uint64_t forward_ = 0;
   std::uint64_t backward_ = 0;
   std::uint64_t peer_delays_ = 0;
-  Counters before_;
 };
 
 }  // namespace

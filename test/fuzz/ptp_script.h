@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/wire/byte_order.h"
+#include "ftcs/ptp/wire/codec.h"
+#include "test/fuzz/require.h"
+
+namespace ftcs::ptp {
+
+/// Octets as a script: what the scripts for both roles of a port draw from them. Plausible and
+/// extreme values; what lies behind the end reads as zero.
+class PtpScript {
+ protected:
+  explicit PtpScript(std::span<const std::uint8_t> octets) : octets_(octets), reader_(octets) {}
+
+  [[nodiscard]] bool ended() const { return reader_.offset() >= octets_.size(); }
+  std::uint8_t octet() { return reader_.read<std::uint8_t>(); }
+
+  /// A length, and so many octets as they are.
+  struct Raw {
+    std::array<std::uint8_t, 255> bytes{};
+    std::size_t size = 0;
+    [[nodiscard]] std::span<const std::uint8_t> view() const { return {bytes.data(), size}; }
+  };
+  Raw raw() {
+    Raw message;
+    message.size = octet();
+    for (std::size_t i = 0; i < message.size; ++i) message.bytes[i] = octet();
+    return message;
+  }
+  PortIdentity port() {
+    return {ClockIdentity::from_mac({2, 0, 0, 0, 0, static_cast<std::uint8_t>(octet() % 12)}), 1};
+  }
+  Duration correction() {
+    const std::uint8_t choice = octet();
+    if (choice < 64) return Duration::from_whole_ns(choice);
+    if (choice < 128) return Duration::from_whole_ns(-std::int64_t{choice});
+    return Duration::from_scaled_ns(std::int64_t{choice} << 55);
+  }
+  /// Near the right time, a jump away, or at an end of what a Timestamp can hold.
+  ReferenceTime time() {
+    using namespace std::chrono_literals;
+    const std::uint8_t choice = octet();
+    if (choice == 255) return ReferenceTime::from_ns(std::numeric_limits<std::int64_t>::max());
+    if (choice == 254) return {};
+    const Duration jump{1s * (choice > 200 ? int{choice} - 227 : 0)};
+    return ReferenceTime{now_.since_epoch() + jump + Duration{100us * int{choice}}};
+  }
+
+  void require_growth(const Counters& counters) {
+    for (std::size_t i = 0; i < kCounters; ++i) {
+      const auto counter = static_cast<Counter>(i);
+      fuzz::require(counters[counter] >= before_[counter], "counters only grow");
+    }
+    fuzz::require(counters[Counter::kActionsDropped] == 0, "the list holds all actions");
+    before_ = counters;
+  }
+
+  /// Whatever is due at this instant; it comes to an end.
+  template <class Core, class Check>
+  void fire_timers(Core& core, Check check) {
+    constexpr int kAtOnce = 64;
+    for (int i = 0; i < kAtOnce; ++i) {
+      const auto due = core.deadline();
+      if (!due || *due > now_) return;
+      check(core.on_timer(now_));
+    }
+    fuzz::require(false, "timers at one instant come to an end");
+  }
+
+  FreeRunningTime now_ = FreeRunningTime{Duration{std::chrono::hours{1}}};
+
+ private:
+  std::span<const std::uint8_t> octets_;
+  ByteReader reader_;
+  Counters before_;
+};
+
+}  // namespace ftcs::ptp
