@@ -64,15 +64,27 @@ Wrong set_identity(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
-Wrong set_delay_mechanism(PtpOptions& options, std::string_view text) {
-  if (text == "E2E") {
-    options.delay_mechanism = ptp::DelayMechanism::kEndToEnd;
-  } else if (text == "P2P") {
-    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
-  } else {
-    return fmt::format("'{}' is not supported, only E2E and P2P", text);
+/// One of two words.
+template <class Value>
+struct Choice {
+  std::string_view word;
+  Value value;
+};
+template <class Value>
+Wrong choose(std::string_view text, Value& target, const Choice<Value>& one,
+             const Choice<Value>& other) {
+  for (const Choice<Value>& choice : {one, other}) {
+    if (text != choice.word) continue;
+    target = choice.value;
+    return std::nullopt;
   }
-  return std::nullopt;
+  return fmt::format("'{}' is not supported, only {} and {}", text, one.word, other.word);
+}
+
+Wrong set_delay_mechanism(PtpOptions& options, std::string_view text) {
+  using ptp::DelayMechanism;
+  return choose(text, options.delay_mechanism, {"E2E", DelayMechanism::kEndToEnd},
+                {"P2P", DelayMechanism::kPeerToPeer});
 }
 
 Wrong set_transport(PtpOptions& options, std::string_view text) {
@@ -90,11 +102,7 @@ Wrong mac(std::string_view text, platform::MacAddress& target) {
 }
 
 Wrong set_capable(PtpOptions& options, std::string_view text) {
-  if (text != "auto" && text != "true") {
-    return fmt::format("'{}' is not supported, only auto and true", text);
-  }
-  options.always_capable = text == "true";
-  return std::nullopt;
+  return choose(text, options.always_capable, {"auto", false}, {"true", true});
 }
 
 Wrong set_clock_servo(PtpOptions& options, std::string_view text) {
@@ -115,26 +123,15 @@ Wrong set_driftfile(PtpOptions& options, std::string_view text) {
 }
 
 Wrong set_delay_filter(PtpOptions& options, std::string_view text) {
-  auto& kind = options.servo.two_way.path_delay.filter.kind;
-  if (text == "moving_median") {
-    kind = DelayFilterKind::kMovingMedian;
-  } else if (text == "moving_minimum") {
-    kind = DelayFilterKind::kMovingMinimum;
-  } else {
-    return fmt::format("'{}' is not supported, only moving_median and moving_minimum", text);
-  }
-  return std::nullopt;
+  return choose(text, options.servo.two_way.path_delay.filter.kind,
+                {"moving_median", DelayFilterKind::kMovingMedian},
+                {"moving_minimum", DelayFilterKind::kMovingMinimum});
 }
 
 Wrong set_time_stamping(PtpOptions& options, std::string_view text) {
-  if (text == "hardware") {
-    options.timestamps = platform::TimestampMode::kHardware;
-  } else if (text == "software") {
-    options.timestamps = platform::TimestampMode::kSoftware;
-  } else {
-    return fmt::format("'{}' is not supported, only hardware and software", text);
-  }
-  return std::nullopt;
+  using platform::TimestampMode;
+  return choose(text, options.timestamps, {"hardware", TimestampMode::kHardware},
+                {"software", TimestampMode::kSoftware});
 }
 
 Wrong set_receiver_only(PtpOptions& options, std::string_view text) {

@@ -15,23 +15,12 @@
 
 #include "ftcs/ethercat/maindevice/csp_profile.h"
 #include "ftcs/ethercat/test/main_bench.h"
+#include "test/support/shell_lines.h"
 
 namespace ftcs::ethercat {
 namespace {
 
-std::vector<std::string> lines_of(const std::string& command) {
-  std::vector<std::string> lines;
-  FILE* const pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return lines;
-  std::array<char, 1024> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) {
-    std::string line(buffer.data());
-    line.erase(line.find_last_not_of('\n') + 1);
-    lines.push_back(line);
-  }
-  pclose(pipe);
-  return lines;
-}
+using ftcs::test::lines_of;
 
 /// A capture file of Ethernet packets (libpcap's format, link type 1).
 class Capture {
@@ -122,7 +111,7 @@ void record(test::MainBench& bench, Capture& capture, bool udp) {
   };
 }
 
-TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
+MainDeviceConfig quick_config() {
   constexpr Nanoseconds kCycle{1'000'000};
   static constexpr auto kObjects = csp_objects(kCycle);
   MainDeviceConfig config;
@@ -130,7 +119,11 @@ TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
   config.process.objects = kObjects;
   config.process.cycle = kCycle;
   config.process.sync0_shift = Nanoseconds{500'000};
-  test::MainBench bench(config);
+  return config;
+}
+
+TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
+  test::MainBench bench(quick_config());
   bench.add_line(2, Nanoseconds{50});
   Capture capture;
   record(bench, capture, GetParam());
@@ -152,14 +145,7 @@ TEST_P(Tshark, reads_a_bring_up_and_cycles_without_an_error) {
 }
 
 TEST_P(Tshark, reads_the_way_back_of_a_restarted_drive_without_an_error) {
-  constexpr Nanoseconds kCycle{1'000'000};
-  static constexpr auto kObjects = csp_objects(kCycle);
-  MainDeviceConfig config;
-  config.clocks.drift_pulses = 5;
-  config.process.objects = kObjects;
-  config.process.cycle = kCycle;
-  config.process.sync0_shift = Nanoseconds{500'000};
-  test::MainBench bench(config);
+  test::MainBench bench(quick_config());
   bench.add_line(2, Nanoseconds{50});
   bench.bring_up();
   ASSERT_TRUE(bench.main().cyclic());

@@ -14,25 +14,12 @@
 
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/ptp/time_transmitter.h"
+#include "test/support/shell_lines.h"
 
 namespace ftcs::ptp {
 namespace {
 using namespace std::chrono_literals;
-
-/// Lines that a command prints.
-std::vector<std::string> lines_of(const std::string& command) {
-  std::vector<std::string> lines;
-  FILE* const pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return lines;
-  char buffer[1024];
-  while (std::fgets(buffer, sizeof buffer, pipe) != nullptr) {
-    std::string line(buffer);
-    line.erase(line.find_last_not_of('\n') + 1);
-    lines.push_back(line);
-  }
-  pclose(pipe);
-  return lines;
-}
+using test::lines_of;
 
 /// A folder of its own that is removed with its content.
 class TemporaryFolder {
@@ -86,6 +73,18 @@ class Tshark : public testing::Test {
 const PortIdentity kTransmitterPort{ClockIdentity::from_mac({2, 0, 0, 0, 0, 0xA}), 1};
 const PortIdentity kReceiverPort{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 2};
 
+/// What is sent, which is added to `all`.
+std::vector<SendMessage> kept(const ActionList& actions, std::vector<MessageBytes>& all) {
+  std::vector<SendMessage> sent;
+  for (const Action& action : actions) {
+    if (const auto* send = std::get_if<SendMessage>(&action)) {
+      sent.push_back(*send);
+      all.push_back(send->bytes);
+    }
+  }
+  return sent;
+}
+
 /// One of each message that we can send, in a conversation.
 std::vector<MessageBytes> conversation(bool unicast, std::uint8_t minor_version) {
   TimeTransmitterConfig transmitter_config;
@@ -100,16 +99,7 @@ std::vector<MessageBytes> conversation(bool unicast, std::uint8_t minor_version)
   TimeTransmitter transmitter(transmitter_config);
   TimeReceiver receiver(receiver_config);
   std::vector<MessageBytes> all;
-  const auto keep = [&](const ActionList& actions) {
-    std::vector<SendMessage> sent;
-    for (const Action& action : actions) {
-      if (const auto* send = std::get_if<SendMessage>(&action)) {
-        sent.push_back(*send);
-        all.push_back(send->bytes);
-      }
-    }
-    return sent;
-  };
+  const auto keep = [&all](const ActionList& actions) { return kept(actions, all); };
   const auto reference = ReferenceTime{Duration{1'800'000'000s} + Duration::from_ns(5.5)};
   FreeRunningTime now;
   keep(transmitter.start(now));
@@ -185,16 +175,7 @@ std::vector<MessageBytes> peer_conversation() {
   TimeTransmitter transmitter(transmitter_config);
   TimeReceiver receiver(receiver_config);
   std::vector<MessageBytes> all;
-  const auto keep = [&](const ActionList& actions) {
-    std::vector<SendMessage> sent;
-    for (const Action& action : actions) {
-      if (const auto* send = std::get_if<SendMessage>(&action)) {
-        sent.push_back(*send);
-        all.push_back(send->bytes);
-      }
-    }
-    return sent;
-  };
+  const auto keep = [&all](const ActionList& actions) { return kept(actions, all); };
   const auto reference = ReferenceTime{Duration{1'800'000'000s} + Duration::from_ns(5.5)};
   const FreeRunningTime now{Duration{1s} + Duration::from_ns(0.25)};
   keep(transmitter.start(now));

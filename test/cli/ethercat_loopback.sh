@@ -4,21 +4,8 @@
 # not timing: the machine may be busy.
 set -uo pipefail
 
-ftcs=$(realpath "${1:-build/ftcs}")
-folder=$(mktemp -d)
-segment=
-cleanup() {
-  [ -n "$segment" ] && kill "$segment" 2> /dev/null
-  wait 2> /dev/null
-  rm -rf "$folder"
-}
-trap cleanup EXIT
-
-fail() {
-  echo "FAILED: $*"
-  for log in "$folder"/*; do echo "--- $(basename "$log")"; tail -n 15 "$log"; done
-  exit 1
-}
+# shellcheck source=test/cli/common.sh
+source "$(dirname "$0")/common.sh"
 
 port=$((30000 + $$ % 5000))
 to=(--udp "127.0.0.1:$port")
@@ -33,6 +20,7 @@ grep -q "no reply from 127.0.0.1:$port" "$folder/nobody" || fail "nobody there: 
 
 "$ftcs" ethercat-segment --udp "$port" --drives 8 --priority 70 --json "$folder/segment.json" > "$folder/segment" 2>&1 &
 segment=$!
+pids+=("$segment")
 sleep 0.5
 "$ftcs" ethercat scan "${to[@]}" > "$folder/scan" 2>&1 || fail "scan"
 [ "$(grep -c "modelled servo drive" "$folder/scan")" -eq 8 ] || fail "scan: expected eight drives"
@@ -85,6 +73,7 @@ code=$?
 # A reference that runs 5 % too fast from the seventh second on is beyond what the cycle may be bent: a defined end.
 "$ftcs" ethercat-segment --udp $((port + 1)) --drives 2 --priority 70 --fault skew:0@5=50000 --duration 40 --sign-bit-behind > "$folder/skewed" 2>&1 &
 skewed=$!
+pids+=("$skewed")
 sleep 0.3
 "$ftcs" ethercat run --udp "127.0.0.1:$((port + 1))" --drives 2 --servo adaptive --cycle 4ms --gate 2ms --drift-pulses 200 -q \
   --unlocked-limit 1 --lost-frame-limit 1000 --duration 20 > "$folder/unlocked" 2>&1
@@ -93,7 +82,6 @@ kill -INT "$skewed"
 [ $code -eq 1 ] && grep -q "cycle out of sync with the reference" "$folder/unlocked" || fail "lost sync: exit code $code, expected 1"
 kill -INT "$segment"
 wait "$segment" || fail "segment: exit code $?, expected 0 after SIGINT"
-segment=
 grep -q '"sync0_events": [1-9]' "$folder/segment.json" || fail "segment: no SYNC0 in OP"
 # Ctrl-C ended the last run, and the drives were told: none found out by its watchdog.
 [ "$(grep -cE "^drive +[0-9]+ +SAFEOP +0x0000" "$folder/segment")" -eq 8 ] || fail "segment: not all drives in SAFEOP without an error"

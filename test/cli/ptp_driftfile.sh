@@ -4,21 +4,8 @@
 # writable costs one warning and never the run.
 set -uo pipefail
 
-ftcs=$(realpath "${1:-build/ftcs}")
-folder=$(mktemp -d)
-pids=()
-cleanup() {
-  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null; done
-  wait 2> /dev/null
-  rm -rf "$folder"
-}
-trap cleanup EXIT
-
-fail() {
-  echo "FAILED: $*"
-  for log in "$folder"/*.log "$folder"/drift; do echo "--- $(basename "$log")"; tail -n 15 "$log"; done
-  exit 1
-}
+# shellcheck source=test/cli/common.sh
+source "$(dirname "$0")/common.sh"
 
 port=$((30000 + 2 * ($$ % 1000)))
 ptp() { exec "$ftcs" ptp -i lo --event-port $port --general-port $((port + 1)) "$@"; }

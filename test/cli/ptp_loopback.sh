@@ -4,21 +4,8 @@
 # formats, exit codes, signals.
 set -uo pipefail
 
-ftcs=$(realpath "${1:-build/ftcs}")
-folder=$(mktemp -d)
-pids=()
-cleanup() {
-  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null; done
-  wait 2> /dev/null
-  rm -rf "$folder"
-}
-trap cleanup EXIT
-
-fail() {
-  echo "FAILED: $*"
-  for log in "$folder"/*; do echo "--- $(basename "$log")"; tail -n 15 "$log"; done
-  exit 1
-}
+# shellcheck source=test/cli/common.sh
+source "$(dirname "$0")/common.sh"
 
 # Always in the background: the process becomes the program, so that its pid takes the signals.
 port=$((20000 + 2 * ($$ % 5000)))

@@ -8,13 +8,10 @@
 set -euo pipefail
 
 ftcs=$(realpath "${1:-build/ftcs}")
-skip() { echo "skipped: $*"; exit 77; }
-[ -n "${CLKNETSIM_PATH:-}" ] || skip "CLKNETSIM_PATH names no clknetsim"
-[ -x "$CLKNETSIM_PATH/clknetsim" ] || skip "$CLKNETSIM_PATH holds no clknetsim"
+# shellcheck source=test/peer/clknetsim_common.sh
+source "$(dirname "$0")/clknetsim_common.sh"
 command -v setpriv > /dev/null || skip "no setpriv to drop the right to set clocks"
 
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
 failures=0
 # 2016-12-31 00:00 as the simulator's start; the list counts from 1900.
 start=1483142400
@@ -29,6 +26,7 @@ day() {  # TAI - UTC after midnight, more flags
     LD_PRELOAD="$CLKNETSIM_PATH/clknetsim.so" CLKNETSIM_NODE=1 CLKNETSIM_SOCKET="$folder/socket" \
     "$ftcs" phc -s /dev/ptp0 --leapfile "$folder/list" -R 0.25 -l 5 "$@" > "$folder/log" 2>&1 &
   local node=$!
+  pids=("$node")
   CLKNETSIM_RANDOM_SEED=3 "$CLKNETSIM_PATH/clknetsim" -s "$folder/socket" -l 86600 -o "$folder/offsets" "$folder/conf" 1 \
     > "$folder/stats" 2> "$folder/simulator" || { cat "$folder/simulator" "$folder/log"; exit 1; }
   wait "$node" || failures=$((failures + 1))

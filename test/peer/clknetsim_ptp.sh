@@ -4,33 +4,15 @@
 # ptp4l's time transmitter, with simulated hardware and with software timestamps, end to end and peer to peer.
 #
 # CLKNETSIM_PATH=folder with clknetsim and clknetsim.so   test/peer/clknetsim_ptp.sh [build/ftcs]
-# Skipped (77) without it. It is GPL and never part of this project: a separate program.
+# Skipped (77) without it.
 set -euo pipefail
 
 ftcs=$(realpath "${1:-build/ftcs}")
 seconds=${SECONDS_SIMULATED:-300}
 
-skip() { echo "skipped: $*"; exit 77; }
-[ -n "${CLKNETSIM_PATH:-}" ] || skip "CLKNETSIM_PATH names no clknetsim"
-[ -x "$CLKNETSIM_PATH/clknetsim" ] || skip "$CLKNETSIM_PATH holds no clknetsim"
-ptp4l=$(command -v ptp4l || echo /usr/sbin/ptp4l)
-[ -x "$ptp4l" ] || skip "no ptp4l"
-
-folder=$(mktemp -d)
-pids=()
-cleanup() {
-  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null || true; done
-  rm -rf "$folder"
-}
-trap cleanup EXIT
-
-start_node() {  # number, program and its arguments
-  local node=$1
-  shift
-  LD_PRELOAD=$CLKNETSIM_PATH/clknetsim.so CLKNETSIM_NODE=$node CLKNETSIM_SOCKET=$folder/sock \
-    "$@" > "$folder/log.$node" 2>&1 &
-  pids+=($!)
-}
+# shellcheck source=test/peer/clknetsim_common.sh
+source "$(dirname "$0")/clknetsim_common.sh"
+command -v ptp4l > /dev/null || skip "no ptp4l"
 
 run() {  # kind of time stamping, delay mechanism
   local kind=$1 mechanism=$2 result
@@ -49,7 +31,7 @@ logMinDelayReqInterval -3
 delay_mechanism $mechanism
 EOF
   pids=()
-  start_node 1 "$ptp4l" -f "$folder/transmitter.conf" -i eth0 -m -q
+  start_node 1 ptp4l -f "$folder/transmitter.conf" -i eth0 -m -q
   start_node 2 "$ftcs" ptp -i eth0 --time_stamping "$kind" --delay_mechanism "$mechanism" --summary_interval -7
   "$CLKNETSIM_PATH/clknetsim" -s "$folder/sock" -l "$seconds" "$folder/conf" 2 \
     > "$folder/stats" 2> "$folder/log" || { cat "$folder/log" "$folder"/log.*; return 1; }

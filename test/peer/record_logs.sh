@@ -5,35 +5,16 @@
 # through `ftcs compare --log`. With a folder the logs are kept there: test/data/logs was made so.
 #
 # CLKNETSIM_PATH=folder with clknetsim and clknetsim.so   test/peer/record_logs.sh [build/ftcs] [FOLDER]
-# Skipped (77) without it, or without a program. They are GPL and never part of this project: separate programs.
+# Skipped (77) without it, or without a program.
 set -euo pipefail
 
 ftcs=$(realpath "${1:-build/ftcs}")
 keep=${2:+$(realpath "$2")}
 
-skip() { echo "skipped: $*"; exit 77; }
-[ -n "${CLKNETSIM_PATH:-}" ] || skip "CLKNETSIM_PATH names no clknetsim"
-[ -x "$CLKNETSIM_PATH/clknetsim" ] || skip "$CLKNETSIM_PATH holds no clknetsim"
-CLKNETSIM_PATH=$(realpath "$CLKNETSIM_PATH")
-PATH=$PATH:/usr/sbin
+# shellcheck source=test/peer/clknetsim_common.sh
+source "$(dirname "$0")/clknetsim_common.sh"
 for program in ptp4l phc2sys chronyd; do command -v "$program" > /dev/null || skip "no $program"; done
-
-folder=$(mktemp -d)
-pids=()
-cleanup() {
-  for pid in "${pids[@]}"; do kill "$pid" 2> /dev/null || true; done
-  rm -rf "$folder"
-}
-trap cleanup EXIT
 cd "$folder"
-
-start_node() {  # number, program and its arguments
-  local node=$1
-  shift
-  LD_PRELOAD=$CLKNETSIM_PATH/clknetsim.so CLKNETSIM_NODE=$node CLKNETSIM_SOCKET=$folder/sock \
-    "$@" > "$folder/log.$node" 2>&1 &
-  pids+=($!)
-}
 
 simulate() {  # seconds, nodes
   "$CLKNETSIM_PATH/clknetsim" -s "$folder/sock" -l "$1" "$folder/conf" "$2" > stats 2> simulator ||
