@@ -150,18 +150,21 @@ void add_ptp_arguments(CLI::App& command, PtpArguments& arguments) {
   add_clock_flags(command, arguments);
   add_run_flags(command, arguments);
   add_network_flags(command, arguments);
-  for (const PtpSetting& setting : ptp_settings()) {
-    const std::string name = setting.name;
-    command
+  const auto add_setting = [&](const std::string& name, const std::string& help) {
+    return command
         .add_option_function<std::string>(
             "--" + name,
             [&arguments, name](const std::string& value) {
               arguments.settings.emplace_back(name, value);
             },
-            setting.help)
-        ->type_name("VALUE")
-        ->group("Settings of ptp4l's configuration file");
+            help)
+        ->type_name("VALUE");
+  };
+  for (const PtpSetting& setting : ptp_settings()) {
+    add_setting(setting.name, setting.help)->group("Settings of ptp4l's configuration file");
   }
+  // As in a file: accepted with the value that describes what happens anyway. Not in the help.
+  for (const std::string& name : fixed_setting_names()) add_setting(name, "")->group("");
 }
 
 }  // namespace ftcs::app

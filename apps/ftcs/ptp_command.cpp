@@ -172,6 +172,12 @@ Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
   if (arguments.receiver_only && options.role == Role::kTimeTransmitter) {
     return "-s asks for a time receiver, --role for a time transmitter";
   }
+  for (const auto& [name, value] : arguments.settings) {
+    const bool transmitter = (name == "masterOnly" || name == "serverOnly") && value == "1";
+    if (arguments.receiver_only && transmitter) {
+      return fmt::format("-s asks for a time receiver, --{} for a time transmitter", name);
+    }
+  }
   if (arguments.hardware) options.timestamps = platform::TimestampMode::kHardware;
   if (arguments.software) options.timestamps = platform::TimestampMode::kSoftware;
   if (arguments.json) options.output = Output::kJson;

@@ -366,6 +366,12 @@ std::optional<ptp::ClockIdentity> parse_clock_identity(std::string_view text) {
 
 std::span<const PtpSetting> ptp_settings() { return kSettings; }
 
+std::vector<std::string> fixed_setting_names() {
+  std::vector<std::string> names;
+  for (const Fixed& fixed : kFixed) names.emplace_back(fixed.name);
+  return names;
+}
+
 std::optional<std::string> apply_setting(PtpOptions& options, std::string_view name,
                                          std::string_view value) {
   for (const PtpSetting& setting : kSettings) {

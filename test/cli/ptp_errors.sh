@@ -63,6 +63,9 @@ expect 2 "not an IPv4 address" ptp -i lo --unicast somewhere
 expect 2 "must differ" ptp -i lo --event-port 4000 --general-port 4000
 expect 2 "--role" ptp -i lo --role grandmaster
 expect 2 "-s asks for a time receiver" ptp -i lo -s --role time-transmitter
+expect 2 "-s asks for a time receiver, --masterOnly" ptp -i lo -s --masterOnly 1
+expect 2 "boundary_clock_jbod: '1' is not supported, only 0" ptp -i lo --boundary_clock_jbod 1
+expect 1 "interface nosuch0" ptp -i nosuch0 --boundary_clock_jbod 0 --twoStepFlag 1 --G.8275.portDS.localPriority 128
 expect 2 "domainNumber: '256': expected an integer from 0 to 255" ptp -i lo --domainNumber 256
 expect 2 "'DeviceNet' is not supported, only UDPv4, UDPv6 and L2" ptp -i lo --network_transport DeviceNet
 expect 2 "excludes" ptp -i lo -H -S
