@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/ftcs/servo_trial.h"
+#include "ftcs/analysis/statistics.h"
 #include "ftcs/clock/skewed_source.h"
 #include "ftcs/platform/kernel.h"
 #include "ftcs/platform/local_socket.h"
@@ -36,41 +37,56 @@ double drift_ns(const TimestampClock::RealtimeReading& a,
 
 class Trials {
  public:
-  Trials(SkewedSource& source, const TimestampClock::RealtimeReading& start) {
+  Trials(SkewedSource& source, const TimestampClock::RealtimeReading& start)
+      : source_(source),
+        truth_{Duration::from_whole_ns(start.realtime_ns) - start.free_running.since_epoch()} {
     VirtualClockConfig clock;
     clock.free_running = start.free_running;
     clock.local = LocalTime::from_ns(start.realtime_ns) + kOffset;
-    const app::TrueReference truth{Duration::from_whole_ns(start.realtime_ns) -
-                                   start.free_running.since_epoch()};
     for (const ServoKind kind : {ServoKind::kAdaptive, ServoKind::kFtcs, ServoKind::kLinuxptpPi}) {
       DisciplineConfig discipline;
       discipline.servo.kind = kind;
       discipline.servo.linuxptp_pi.first_step_threshold = Nanoseconds{0};
       trials_.push_back(std::make_unique<app::ServoTrial>(
-          app::ServoTrial::Setup{std::string(servo_kind_name(kind)), discipline, clock, truth},
+          app::ServoTrial::Setup{std::string(servo_kind_name(kind)), discipline, clock, truth_},
           source));
     }
   }
   void on_pair(const EventPair& pair) {
     for (const auto& trial : trials_) trial->on_pair(pair);
+    const Duration later = truth_.at(source_.to_underlying(pair.free_running)) - pair.reference;
+    if (pair.direction == Direction::kForward) {
+      ahead_ns_.push_back(later.ns());
+    } else {
+      back_ns_.push_back(-later.ns());
+    }
   }
   void print(std::uint64_t syncs, double drift) const {
-    std::printf("{\"syncs\": %llu, \"realtime_drift_ns\": %.1f, \"servos\": [",
-                static_cast<unsigned long long>(syncs), drift);
+    const double asymmetry = ahead_ns_.empty() || back_ns_.empty()
+                                 ? 0.0
+                                 : (summarize(ahead_ns_).median - summarize(back_ns_).median) / 2.0;
+    std::printf(
+        "{\"syncs\": %llu, \"realtime_drift_ns\": %.1f, \"asymmetry_ns\": %.1f, \"servos\": [",
+        static_cast<unsigned long long>(syncs), drift, asymmetry);
     for (std::size_t i = 0; i < trials_.size(); ++i) {
       const app::TrialResult result = trials_[i]->result(kLockBandNs);
       std::printf(
           "%s{\"servo\": \"%s\", \"locked\": %s, \"cycles_to_lock\": %lld, "
-          "\"true_error_rms_ns\": %.1f, \"perceived_rms_ns\": %.1f, \"rejected\": %llu}",
+          "\"true_error_rms_ns\": %.1f, \"true_error_mean_ns\": %.1f, "
+          "\"perceived_rms_ns\": %.1f, \"rejected\": %llu}",
           i == 0 ? "" : ", ", result.servo.c_str(), result.locked ? "true" : "false",
           result.cycles_to_lock ? static_cast<long long>(*result.cycles_to_lock) : -1LL,
-          result.rms_second_half_ns, result.rms_perceived_offset_ns,
+          result.rms_second_half_ns, result.mean_second_half_ns, result.rms_perceived_offset_ns,
           static_cast<unsigned long long>(result.rejected));
     }
     std::printf("]}\n");
   }
 
  private:
+  SkewedSource& source_;
+  app::TrueReference truth_;
+  std::vector<double> ahead_ns_;
+  std::vector<double> back_ns_;
   std::vector<std::unique_ptr<app::ServoTrial>> trials_;
 };
 

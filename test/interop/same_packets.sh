@@ -6,9 +6,10 @@
 # - in each of five runs lock no later, and have a lower true RMS from lock to the end, each servo from its own lock (its
 #   own is the longest: from the second or third Sync on, while linuxptp-pi's leaves the first eight seconds out);
 # - over the second half, the same time for all, have a lower true RMS in four of five runs and in all five together.
-# Why not in every run: in 8 of 8 runs on a quiet machine of two processors it had, in 7 of 8 beside six busy shells. Under
-# load some messages take a tenth of the usual time (sender and receiver on one processor), and two such answers in a row
-# were once taken for a change of frequency: 2.7 us for half a second.
+# Why not in every run: it had in 18 of 18 runs on a machine of two processors without load of our own, and in 17 of 18
+# beside six busy shells (from lock on in all 36). Under load some messages take a tenth of the usual time (sender and
+# receiver on one processor), and two such answers in a row were once taken for a change of frequency: 2.7 us for half a
+# second.
 #
 # test/interop/same_packets.sh [build/ftcs] [SECONDS of one run]
 . "$(dirname "$0")/common.sh"
