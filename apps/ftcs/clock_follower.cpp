@@ -95,6 +95,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
   EventPair pair = emitted;
   pair.reference = pair.reference + link_delay_.value();
   const LocalTime local = clock_.local_at(pair.free_running);
+  discipline_.on_announced_interval(sync_interval.value_or(Duration{}));
   Telemetry telemetry = discipline_.on_pair(pair);
   if (telemetry.error) {
     if (auto wrong = on_clock_error(*telemetry.error)) return wrong;

@@ -40,6 +40,16 @@ class Follower : public testing::Test {
         {Direction::kBackward, ReferenceTime::from_ns(sent + kDelay), source.instant}, source.now(),
         std::nullopt));
   }
+  /// Syncs that were held up and come 5 ms apart, from a transmitter that announces 125 ms.
+  void burst(int syncs) {
+    for (int i = 0; i < syncs; ++i) {
+      at += 5'000'000;
+      source.instant = FreeRunningTime::from_ns(at + kDelay);
+      EXPECT_FALSE(
+          follower->on_pair({Direction::kForward, ReferenceTime::from_ns(at), source.instant},
+                            source.now(), Duration::from_whole_ns(kSecond / 8)));
+    }
+  }
   std::string logged() {
     std::rewind(file);
     std::string text;
@@ -64,6 +74,13 @@ TEST_F(Follower, holdover_for_want_of_messages_says_so) {
   source.instant = FreeRunningTime::from_ns(at + kSecond);
   follower->on_silence();
   EXPECT_NE(logged().find("test: no Sync for a while; keeping"), std::string::npos) << logged();
+}
+
+TEST_F(Follower, a_burst_of_held_up_messages_is_no_shorter_interval) {
+  burst(6);
+  source.instant = source.instant + Duration::from_whole_ns(kSecond / 8);
+  follower->on_silence();
+  EXPECT_EQ(logged(), "");
 }
 
 TEST_F(Follower, holdover_because_messages_are_refused_says_that_instead) {

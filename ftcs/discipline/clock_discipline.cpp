@@ -70,6 +70,10 @@ Telemetry ClockDiscipline::on_silence() noexcept {
   begin(now);
   if (telemetry_.servo.offset_known) telemetry_.servo = servo_.snapshot_at(now);
   check_silence(now);
+  // What is silence is decided here: the servo knows only the gaps that it saw.
+  if (!in_holdover_ && telemetry_.servo.state == ServoState::kHoldover) {
+    telemetry_.servo.state = servo_.snapshot().state;
+  }
   return finish();
 }
 
@@ -78,6 +82,7 @@ void ClockDiscipline::on_new_reference() noexcept {
   lock_.reset();
   has_sample_ = false;
   last_gap_ = Duration{};
+  announced_interval_ = Duration{};
   in_holdover_ = false;
   ++counters_.new_references;
   telemetry_.servo = servo_.snapshot();
@@ -132,9 +137,12 @@ void ClockDiscipline::note_sample(const EventPair& pair) noexcept {
 }
 
 void ClockDiscipline::check_silence(const ClockReading& reading) noexcept {
-  if (!has_sample_ || in_holdover_ || sync_interval_ <= Duration{}) return;
+  const bool configured = config_.servo.sync_interval > Nanoseconds{0};
+  const Duration interval =
+      configured ? sync_interval_ : std::max(sync_interval_, announced_interval_);
+  if (!has_sample_ || in_holdover_ || interval <= Duration{}) return;
   const double silence_ns = (reading.free_running - last_sample_.free_running).ns();
-  if (silence_ns <= sync_interval_.ns() * config_.missed_intervals_to_holdover) return;
+  if (silence_ns <= interval.ns() * config_.missed_intervals_to_holdover) return;
   in_holdover_ = true;
   ++counters_.holdovers;
 }

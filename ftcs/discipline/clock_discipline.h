@@ -44,6 +44,9 @@ class ClockDiscipline {
   /// To be called when nothing has come for a while, as often as liked: samples missing for
   /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking rate.
   Telemetry on_silence() noexcept;
+  /// What the time transmitter says of its Sync interval; zero: nothing. Messages that come in a
+  /// burst are then not taken for a shorter one.
+  void on_announced_interval(Duration interval) noexcept { announced_interval_ = interval; }
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:
@@ -79,6 +82,7 @@ class ClockDiscipline {
   /// Configured, or the shorter one of the last two gaps between samples: an outage is no interval.
   Duration sync_interval_{};
   Duration last_gap_{};
+  Duration announced_interval_{};
   Telemetry telemetry_{};
   DisciplineCounters counters_{};
 };

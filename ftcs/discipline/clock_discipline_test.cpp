@@ -201,6 +201,21 @@ TEST_F(ClockDisciplineTest, an_outage_is_not_taken_for_the_interval) {
   EXPECT_FALSE(discipline_->locked());
 }
 
+TEST_F(ClockDisciplineTest, a_burst_is_not_taken_for_the_interval_that_was_announced) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.sync_interval = 0ns;
+  start(Duration{}, config);
+  discipline_->on_announced_interval(kInterval);
+  for (int n = 0; n < 3; ++n) {  // held up together
+    sync();
+    advance(Nanoseconds{5ms});
+  }
+  advance(4 * kInterval - Nanoseconds{5ms});
+  EXPECT_NE(discipline_->on_silence().servo.state, ServoState::kHoldover);
+  advance(Nanoseconds{1});
+  EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover);
+}
+
 TEST_F(ClockDisciplineTest, a_longer_interval_is_learnt_from_two_gaps) {
   DisciplineConfig config = config_for(ServoKind::kFtcs);
   config.servo.sync_interval = 0ns;
