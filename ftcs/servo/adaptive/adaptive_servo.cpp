@@ -53,6 +53,7 @@ BasicAdaptiveServo<Grid>::BasicAdaptiveServo(const AdaptiveConfig& config) noexc
       steering_(config.steering) {
   reset();
   if (config.learnt) {
+    rate_expected_ = true;
     const double cycle = meter_.interval_ns();
     estimator_.expect({config.learnt->rate_deviation * cycle, config.learnt->rate_sigma * cycle},
                       config.learnt->timestamp_noise_ns);
@@ -115,6 +116,7 @@ void BasicAdaptiveServo<Grid>::rebase() noexcept {
 
 template <class Grid>
 bool BasicAdaptiveServo<Grid>::ready() const noexcept {
+  if (state_ == ServoState::kUnlocked && !rate_expected_ && !meter_.tells_rate()) return false;
   if (estimator_.known_delay().known()) return estimator_.count() >= 2;
   return estimator_.count() >= (estimator_.two_way() ? 3U : 4U);
 }

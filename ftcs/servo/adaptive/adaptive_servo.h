@@ -72,6 +72,7 @@ class BasicAdaptiveServo {
   Belief latest_{};
   ServoState state_ = ServoState::kUnlocked;
   bool started_ = false;
+  bool rate_expected_ = false;  ///< from an earlier run
 };
 
 using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid>;

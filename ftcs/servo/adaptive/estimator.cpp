@@ -29,6 +29,7 @@ constexpr std::uint32_t kYoung = 100;
 constexpr std::uint8_t kRejectedInARow = 8;
 constexpr std::uint8_t kRejectedAtLeast = 3;
 constexpr double kRejected = 0.1;
+constexpr std::size_t kFewestResiduals = 3;
 constexpr double kSmallestScale = 1e-4;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
@@ -154,6 +155,12 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
   const Innovations innovations =
       bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
+  if (count_ > kLearnFrom) {
+    const bool delay_free = two_way() && !known_delay_.known();
+    jumps_.follow({seen, shape_[side], scale_, outliers, process_, delay_free,
+                   bank_.estimate(best_), innovations.distance[best_],
+                   innovations.log_density[best_]});
+  }
   bank_.correct(seen, scale_, innovations);
   if (!bank_.healthy() && !bank_.heal(best_)) {  // absurd input
     restart();
@@ -173,12 +180,14 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
     double& late = late_outliers_[side];
     late =
         std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
+    lateness_.observe(side, innovations.centred[best_] > 0.0, innovations.distance[best_]);
     detect_changes(innovations.log_density);
   }
   follow_gate(side, credit, innovation);
   if (count_ == 0) return 0.0;
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
-    residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
+    // What showed a change is not noise.
+    if (since_change_ > 0) residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
     follow_scale();
   }
   if (count_ > kLearnFrom) {
@@ -224,6 +233,8 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   }
   bank_.start(start);
   detector_.clear();
+  jumps_.clear();
+  lateness_.clear();
   for (auto& learner : learner_) learner.restart();
   shape_ = {};
   late_outliers_ = {kOutlierStart, kOutlierStart};
@@ -241,10 +252,22 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
 template <class Grid>
 void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
   const std::uint32_t overtaken = detector_.add(log_density);
+  const auto jump = jumps_.judge(detector_.lead(best_));
+  if (jump == JumpWatch::Verdict::kWait) return;
+  if (jump == JumpWatch::Verdict::kJumped) {  // rate and noise are known as before
+    bank_.start(jumps_.estimate());
+    detector_.clear();
+    jumps_.clear();
+    lateness_.clear();
+    since_change_ = 0;
+    return;
+  }
+  const bool sudden = !two_way() || lateness_.speaks_of_clock();
   // From calm to wild: every source stands behind its target and still has its own state.
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
-    const std::size_t source = detector_.take_over(i, static_cast<double>(count_), log_density);
+    const std::size_t source =
+        detector_.take_over(i, static_cast<double>(count_), log_density, sudden);
     if (source == ChangeDetector<Grid>::kNone) continue;
     bank_.set(i, bank_.estimate(source));
     if (i != best_) continue;
@@ -302,7 +325,10 @@ void Estimator<Grid>::mix() noexcept {
 
 template <class Grid>
 void Estimator<Grid>::follow_scale() noexcept {
-  robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
+  // One message after a change would set the scale alone; at the start there is nothing better.
+  if (residuals_.size() >= kFewestResiduals || since_change_ == count_) {
+    robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
+  }
   if (evidence_.messages() > 4.0 &&
       evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
     // Old gross errors are all that the evidence tells. The model that has coped is right by now;

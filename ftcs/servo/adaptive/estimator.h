@@ -4,10 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "ftcs/servo/adaptive/change_detector.h"
 #include "ftcs/servo/adaptive/delay_shape.h"
 #include "ftcs/servo/adaptive/evidence.h"
+#include "ftcs/servo/adaptive/jump_watch.h"
+#include "ftcs/servo/adaptive/lateness.h"
 #include "ftcs/servo/adaptive/model_bank.h"
 #include "ftcs/servo/adaptive/noise_learner.h"
 #include "ftcs/servo/adaptive/second_opinion.h"
@@ -72,7 +75,6 @@ class Estimator {
   using Row = typename Bank::Row;
   using Innovations = typename Bank::Innovations;
   static constexpr std::size_t kSize = Grid::kSize;
-  static constexpr std::size_t kCalm = kSize - Grid::kJumps;
 
   void begin(Direction direction) noexcept;
   void connect_second_direction(Direction direction) noexcept;
@@ -93,6 +95,8 @@ class Estimator {
   KnownDelay known_delay_{};
   Bank bank_{};
   ChangeDetector<Grid> detector_{};
+  std::conditional_t<Grid::kWatchesJumps, JumpWatch, NoJumpWatch> jumps_{};
+  Lateness lateness_{};
   std::array<NoiseLearner<Grid::kNoiseWindow>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};
   std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};

@@ -27,13 +27,13 @@ template <std::size_t size>
 /// The full bank, ordered from calm to wild: a model may take over the state of any model behind
 /// it. Random-walk FM by decades: the gain of a filter goes with b^(1/4), so that half a decade off
 /// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
-/// a^(1/2). The last three are jumps: of the offset by some and by many sigma, of the path delay.
+/// a^(1/2).
 struct FullGrid {
   static constexpr std::size_t kResidualWindow = 32;  ///< innovations behind the robust scale
   static constexpr std::size_t kNoiseWindow = 32;     ///< of the noise learner, per direction
   static constexpr std::size_t kOpinionWindow = 16;   ///< messages of the second opinion
-  static constexpr std::size_t kSize = 32;
-  static constexpr std::size_t kJumps = 3;
+  static constexpr bool kWatchesJumps = true;
+  static constexpr std::size_t kSize = 28;
   static constexpr std::size_t kStart = 13;    ///< the model that is believed before any evidence
   static constexpr std::size_t kFavoured = 7;  ///< believed a little more than its neighbours
   static constexpr std::array<NoiseModel, kSize> kModels = {{
@@ -44,7 +44,6 @@ struct FullGrid {
       {1e-2, 1e-6, 0.0}, {0.0, 1e-3, 0.0},   {0.0, 1e-2, 0.0},  {1e-1, 1e-7, 0.0},
       {1e-1, 1e-4, 0.0}, {0.0, 1e-1, 0.0},   {0.0, 1e0, 0.0},   {1e0, 1e-6, 0.0},
       {1e0, 1e-3, 0.0},  {0.0, 1e1, 0.0},    {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},
-      {0.0, 1e4, 0.0},   {1e2, 0.0, 0.0},    {1e5, 0.0, 0.0},   {0.0, 0.0, 1e5},
   }};
 };
 
@@ -54,8 +53,8 @@ struct SmallGrid {
   static constexpr std::size_t kResidualWindow = 8;
   static constexpr std::size_t kNoiseWindow = 0;
   static constexpr std::size_t kOpinionWindow = 0;
+  static constexpr bool kWatchesJumps = false;
   static constexpr std::size_t kSize = 3;
-  static constexpr std::size_t kJumps = 0;
   static constexpr std::size_t kStart = 1;
   static constexpr std::size_t kFavoured = kSize;  // none
   static constexpr std::array<NoiseModel, kSize> kModels = {{
