@@ -35,8 +35,11 @@ struct ExchangeScenario {
   double forward_load_ns = 0.0;    ///< replaces the forward noise by an exponential of this mean
   double spike_probability = 0.0;  ///< per packet
   double spike_ns = 100'000.0;
-  double wander = 0.0;      ///< random walk of frequency, per sqrt(s)
-  double square_ppm = 0.0;  ///< amplitude of a square wave of frequency
+  double stall_probability = 0.0;  ///< per packet: that it and the next ones come late
+  int stall_packets = 0;           ///< of both directions, one after the other
+  double stall_ns = 0.0;           ///< by this, each times 0.5 to 1.5
+  double wander = 0.0;             ///< random walk of frequency, per sqrt(s)
+  double square_ppm = 0.0;         ///< amplitude of a square wave of frequency
   double square_half_cycles = 50.0;
   double sine_ppm = 0.0;
   double sine_period_cycles = 75.0;
@@ -141,6 +144,14 @@ class ExchangeSimulator {
     }
     if (scenario_.spike_probability > 0.0 && uniform() < scenario_.spike_probability) {
       noise += scenario_.spike_ns;
+    }
+    if (stalled_ == 0 && scenario_.stall_probability > 0.0 &&
+        uniform() < scenario_.stall_probability) {
+      stalled_ = scenario_.stall_packets;
+    }
+    if (stalled_ > 0) {
+      --stalled_;
+      noise += scenario_.stall_ns * (0.5 + uniform());
     }
     return scenario_.path_delay_ns + noise + (path_stepped_ ? scenario_.path_step_ns : 0.0);
   }
@@ -357,6 +368,7 @@ class ExchangeSimulator {
   TimestampPair request_{}, report_{};
   double event_time_ = 0.0;
   bool path_stepped_ = false;
+  int stalled_ = 0;  ///< packets that are still to come late
 
   ExchangeResult result_;
   Moments early_, late_;

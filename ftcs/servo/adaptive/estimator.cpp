@@ -30,6 +30,9 @@ constexpr std::uint8_t kRejectedInARow = 8;
 constexpr std::uint8_t kRejectedAtLeast = 3;
 constexpr double kRejected = 0.1;
 constexpr std::size_t kFewestResiduals = 3;
+/// Where the noise is known: a host that stands still makes more than half of the window late now
+/// and then, and its milliseconds must not become the noise at once.
+constexpr double kLargestResidual = 30.0;
 constexpr double kSmallestScale = 1e-4;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
@@ -187,7 +190,9 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   if (count_ == 0) return 0.0;
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
-    if (since_change_ > 0) residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
+    const double size = std::sqrt(innovations.distance[best_]);
+    const double most = learner_[side].mature() ? kLargestResidual : size;
+    if (since_change_ > 0) residuals_.push(scale_ * std::min(size, most));
     follow_scale();
   }
   if (count_ > kLearnFrom) {
@@ -300,8 +305,9 @@ void Estimator<Grid>::follow_gate(std::size_t side, double credit, double innova
     return;
   }
   const bool delay_free = two_way() && !known_delay_.known();
-  bank_.for_each([doubt, delay_free](Estimate& e) {
-    e.xx += doubt;
+  const bool clock = !delay_free || lateness_.speaks_of_clock();
+  bank_.for_each([=](Estimate& e) {
+    if (clock) e.xx += doubt;
     if (delay_free) e.dd += doubt;
   });
 }

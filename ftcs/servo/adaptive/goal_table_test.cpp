@@ -140,6 +140,23 @@ TEST(GoalTable, ten_per_cent_spikes_never_show_in_two_hundred_runs) {
   EXPECT_LE(worst(m.max), 1000.0);
 }
 
+// A host that stands still makes both directions late. No clock can do that, whatever the sizes.
+TEST(GoalTable, a_host_that_stands_still_does_not_move_the_clock) {
+  for (const int packets : {2, 3, 4, 6}) {
+    ExchangeScenario scenario;
+    scenario.interval_s = 0.125;
+    scenario.stall_probability = 0.01;
+    scenario.stall_packets = packets;
+    scenario.stall_ns = 200'000.0;
+    const Measured m = measure(scenario, 1, 40);
+    std::printf("%d packets late at a time: rms %.2f, worst %.2f; max %.1f, worst %.1f\n", packets,
+                median(m.rms), worst(m.rms), median(m.max), worst(m.max));
+    EXPECT_LE(median(m.rms), 10.0) << packets;
+    EXPECT_LE(median(m.max), 60.0) << packets;
+    EXPECT_LE(worst(m.max), 1000.0) << packets;
+  }
+}
+
 TEST(GoalTable, after_an_outage_of_a_minute_the_offset_is_still_small) {
   ExchangeScenario scenario;
   scenario.outage_start_s = 600.0;
