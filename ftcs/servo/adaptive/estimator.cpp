@@ -160,7 +160,7 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
       bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
   if (count_ > kLearnFrom) {
     const bool delay_free = two_way() && !known_delay_.known();
-    jumps_.follow({seen, shape_[side], scale_, outliers, process_, delay_free,
+    jumps_.follow({seen, shape_[side], scale_, outliers, process_, two_way(), delay_free,
                    bank_.estimate(best_), innovations.distance[best_],
                    innovations.log_density[best_]});
   }

@@ -16,6 +16,8 @@ constexpr double kPrior = -7.0;
 /// the offset from anything else. A longer path looks like two late packets, which are common.
 constexpr double kCertainOffset = 13.0;
 constexpr double kCertainDelay = 40.0;
+/// One direction alone: late packets look like a jump of the offset, too.
+constexpr double kCertainAlone = 30.0;
 /// Jump or change of rate? Where messages follow each other closely both explain the same, and only
 /// what is usual remains to decide: oscillators do not change by more than some twenty times the
 /// noise in a cycle, clocks are stepped by anything. A factor of two around that counts six nats.
@@ -28,6 +30,7 @@ constexpr double kUnnoticed = 0.5;
 }  // namespace
 
 bool JumpHypothesis::certain() const noexcept {
+  if (!two_way_) return lead_ > kCertainAlone;
   return lead_ > (jumped_ == Of::kOffset ? kCertainOffset : kCertainDelay) && seen_[0] && seen_[1];
 }
 
@@ -42,7 +45,7 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
   preference_ =
       std::clamp(kSteepness * std::log(rate / kUsualRate), -kMostPreference, kMostPreference);
   lead_ = kPrior;
-  seen_ = {};
+  two_way_ = message.two_way;
   alive_ = size * size < ModelBank<OneModel>::kLargestVariance;
 }
 

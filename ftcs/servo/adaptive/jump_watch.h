@@ -17,6 +17,7 @@ struct JumpMessage {
   double scale = 0.0;  ///< s, ns
   OutlierPrior outliers{};
   NoiseModel process{};     ///< of the oscillator
+  bool two_way = false;     ///< messages of both directions come
   bool delay_free = false;  ///< the path delay is estimated, and may jump too
   Estimate believed{};
   double distance = 0.0;     ///< nu^2 / S of this message under it
@@ -42,7 +43,7 @@ class JumpHypothesis {
   [[nodiscard]] Estimate estimate() const noexcept { return filter_.estimate(0); }
   /// Nats by which it is to be preferred to a change of rate that explains the same.
   [[nodiscard]] double preference() const noexcept { return preference_; }
-  /// Enough speaks for it, and messages of both directions.
+  /// Enough speaks for it, and messages of both directions, where both come.
   [[nodiscard]] bool certain() const noexcept;
 
  private:
@@ -59,6 +60,7 @@ class JumpHypothesis {
   double preference_ = 0.0;
   Of jumped_;
   bool alive_ = false;
+  bool two_way_ = false;
   std::array<bool, 2> seen_{};  ///< a message of this direction fits
 };
 

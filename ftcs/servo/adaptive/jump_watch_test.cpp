@@ -17,13 +17,14 @@ using Verdict = JumpWatch::Verdict;
 /// everything far off for an outlier and keeps its opinion.
 class Calm {
  public:
+  explicit Calm(bool two_way = true) : two_way_(two_way) {}
   /// A message `elapsed` cycles after the last one, `z` = x + sign (d + n).
   Verdict message(Direction direction, double elapsed, double z, double rival = 0.0) {
     JumpMessage message;
     message.seen = {direction == Direction::kForward ? 1.0 : -1.0, elapsed, z};
     message.scale = 100.0;
     message.outliers = {0.03, 1e-5};
-    message.delay_free = true;
+    message.two_way = message.delay_free = two_way_;
     message.believed = believed_;
     const double nu = message.seen.sign * (z - believed_.x) - believed_.d;
     const double variance = 1e4 * (1.0 + believed_.xx + believed_.dd);
@@ -41,6 +42,7 @@ class Calm {
  private:
   Estimate believed_{0.0, 0.0, 10'000.0, 0.01, 0.0, 0.0, 1e-8, 0.0, 0.01};
   JumpWatch watch_;
+  bool two_way_;
 };
 
 constexpr double kPath = 10'000.0;
@@ -65,6 +67,16 @@ TEST(JumpWatch, needs_both_directions) {
   Calm calm;
   for (int i = 0; i < 4; ++i) EXPECT_NE(calm.forward(1.0, kPath - 20'000.0), Verdict::kJumped) << i;
   EXPECT_EQ(calm.backward(0.1, -kPath - 20'000.0), Verdict::kJumped);
+}
+
+TEST(JumpWatch, asks_more_of_one_direction_where_there_is_no_other) {
+  Calm calm(false);
+  EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
+  EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
+  Verdict last = Verdict::kNothing;
+  for (int i = 0; i < 3 && last != Verdict::kJumped; ++i)
+    last = calm.forward(1.0, kPath + 20'000.0);
+  EXPECT_EQ(last, Verdict::kJumped);
 }
 
 TEST(JumpWatch, waits_for_certainty_of_a_longer_path_and_leaves_the_offset_alone) {
