@@ -29,7 +29,6 @@ constexpr std::uint32_t kYoung = 100;
 constexpr std::uint8_t kRejectedInARow = 8;
 constexpr std::uint8_t kRejectedAtLeast = 3;
 constexpr double kRejected = 0.1;
-constexpr std::size_t kFewestResiduals = 3;
 /// Where the noise is known: a host that stands still makes more than half of the window late now
 /// and then, and its milliseconds must not become the noise at once.
 constexpr double kLargestResidual = 30.0;
@@ -331,8 +330,7 @@ void Estimator<Grid>::mix() noexcept {
 
 template <class Grid>
 void Estimator<Grid>::follow_scale() noexcept {
-  // One message after a change would set the scale alone; at the start there is nothing better.
-  if (residuals_.size() >= kFewestResiduals || since_change_ == count_) {
+  if (residuals_.size() > 0) {
     robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
   }
   if (evidence_.messages() > 4.0 &&
