@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Length: one world, and each rule of the discipline in it.
 // World: one perfect oscillator that the test moves by hand; a reference that is an affine function
 // of it; a virtual clock on it that the discipline steers. Exact stamps, path delay known (zero)
 // unless a test says otherwise.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Length: one world, and each rule of the paper's servo in it.
 // World: a perfect oscillator, a reference that is an affine function of it, exact stamps; what the
 // servo commands is applied at once unless a test says otherwise. offset = local - reference.
 #include "ftcs/servo/ftcs_servo.h"

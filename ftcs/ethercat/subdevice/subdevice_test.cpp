@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Length: one world, and each register of a SubDevice in it.
 // The world: SubDevices in a line or a tree with perfect crystals, 300 ns a hop, one datagram per
 // frame every 100 us. Expectations come from ETG.1000.4 and .6, not from the code.
 #include "ftcs/ethercat/subdevice/subdevice.h"
