@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: the fake kernel of kernel_clock_test.cpp, and this machine's files and names where locks are
-// meant; no clock of it is opened.
+// World: the fake kernel of kernel_clock_test.cpp, and this machine's files and names where locks
+// are meant; no clock of it is opened.
 #include "ftcs/platform/clock_device.h"
 
 #include <cstdlib>
