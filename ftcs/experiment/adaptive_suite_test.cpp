@@ -82,12 +82,8 @@ double mean(const ServoResult& servo, double RunFigures::*figure) {
   return sum / count;
 }
 
-/// Below the step of the timestamps any error is luck.
-double floor_of(const Scenario& scenario) {
-  const double steps =
-      std::hypot(scenario.world.nodes.front().tick.ns(), scenario.world.reference_tick.ns());
-  return std::max(steps / std::sqrt(12.0), 0.1);
-}
+/// ns: nobody minds below that.
+constexpr double kNothing = 0.1;
 
 /// A constant difference of the two directions' delays cannot be seen by any servo.
 bool has_unknowable_asymmetry(const std::string& scenario) {
@@ -99,7 +95,6 @@ TEST(AdaptiveSuite, is_never_worse_than_plain_ftcs_by_more_than_a_tenth) {
               "adaptive", "p = 1", "ftcs", "adaptive", "p = 1", "ftcs");
   for (std::size_t number = 0; number < scenarios().size(); ++number) {
     const ScenarioResult& scenario = sweep().scenarios[number];
-    const double floor = floor_of(scenarios()[number]);
     const auto rms = [&](std::size_t i) {
       return scenario.servos[i].median(&RunFigures::rms_time_error_ns);
     };
@@ -109,12 +104,12 @@ TEST(AdaptiveSuite, is_never_worse_than_plain_ftcs_by_more_than_a_tenth) {
     std::printf("%-30s %9.2f %9.2f %9.2f |           %9.1f %9.1f %9.1f\n",
                 scenario.scenario.c_str(), rms(0), rms(1), rms(2), ten(0), ten(1), ten(2));
     for (const std::size_t plain : {1U, 2U}) {
-      EXPECT_LE(rms(0), std::max(1.1 * rms(plain), floor)) << scenario.scenario;
+      EXPECT_LE(rms(0), std::max(1.1 * rms(plain), kNothing)) << scenario.scenario;
       // At the end of a chain all clocks start at once; what the last one follows is still moving,
       // and the less a servo believes of it the better. p = 1 is the fair comparison there.
       const bool chain = scenario.scenario.find("chain") != std::string::npos;
       if (chain && plain == 2) continue;
-      EXPECT_LE(ten(0), std::max(1.1 * ten(plain), floor))
+      EXPECT_LE(ten(0), std::max(1.1 * ten(plain), kNothing))
           << scenario.scenario << ", first ten cycles";
     }
   }

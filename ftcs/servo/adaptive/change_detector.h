@@ -62,16 +62,10 @@ class ChangeDetector {
                                       bool sudden) noexcept {
     // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
     const double caution = 1.0 + 16.0 / count;
-    std::size_t winner = kNone;
-    float furthest = 0.0F;
-    for (std::size_t j = i + 1; j < kSize; ++j) {
-      if (sums_[i][j] > furthest) {
-        furthest = sums_[i][j];
-        winner = j;
-      }
-    }
+    const std::size_t winner = most_convincing(i);
     if (winner == kNone) return kNone;
     const double latest = log_density[winner] - log_density[i];
+    if (latest <= 0.0) return kNone;  // what was put off is over
     const bool abrupt = latest > kAbrupt;
     const bool alone = static_cast<double>(sums_[i][winner]) - latest < kSecond;
     if (!sudden && (abrupt || winner >= kSudden)) return kNone;
@@ -84,14 +78,26 @@ class ChangeDetector {
 
   /// How far model i is behind the most convincing wilder one, nats.
   [[nodiscard]] double lead(std::size_t i) const noexcept {
-    float furthest = 0.0F;
-    for (std::size_t j = i + 1; j < kSize; ++j) furthest = std::max(furthest, sums_[i][j]);
-    return static_cast<double>(furthest);
+    const std::size_t winner = most_convincing(i);
+    return winner == kNone ? 0.0 : static_cast<double>(sums_[i][winner]);
   }
 
   void clear() noexcept { sums_ = {}; }
 
  private:
+  /// Of the models wilder than i, or kNone if none explains better.
+  [[nodiscard]] std::size_t most_convincing(std::size_t i) const noexcept {
+    std::size_t winner = kNone;
+    float furthest = 0.0F;
+    for (std::size_t j = i + 1; j < kSize; ++j) {
+      if (sums_[i][j] > furthest) {
+        furthest = sums_[i][j];
+        winner = j;
+      }
+    }
+    return winner;
+  }
+
   /// Nats. One false alarm per e^9.5 = 13,000 messages and pair of models at most (Wald); measured,
   /// with what else is asked of a change: one that mattered in two million.
   static constexpr double kThreshold = 9.5;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// World: log densities per message; index 0 is the calmest model, the last three are jumps.
+// World: log densities per message; index 0 is the calmest model.
 #include "ftcs/servo/adaptive/change_detector.h"
 
 #include <array>
@@ -38,6 +38,19 @@ TEST(ChangeDetector, one_message_that_says_most_decides_sooner_than_many) {
   l[20] = 4.0;
   for (int i = 0; i < 3; ++i) detector.add(l);
   EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone) << "12 nats by and by";
+}
+
+TEST(ChangeDetector, what_was_put_off_is_over_when_the_latest_message_says_otherwise) {
+  Detector detector;
+  Densities l{};
+  l[20] = 20.0;
+  detector.add(l);
+  l[20] = -1.0;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone);
+  l[20] = 0.5;
+  detector.add(l);
+  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U);
 }
 
 TEST(ChangeDetector, a_calmer_model_never_takes_over) {

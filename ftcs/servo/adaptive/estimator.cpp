@@ -17,22 +17,15 @@ constexpr double kRatePrior = 1e10;
 constexpr double kDelayPrior = 1e10;
 /// An early packet is no queueing; only a broken stamp makes one.
 constexpr double kEarlyOutliers = 1e-5;
-constexpr double kOutlierRate = 0.02;
-constexpr double kFewestOutliers = 0.001;
-constexpr double kMostOutliers = 0.2;
 /// Messages after which each of these may begin; before, every prediction is still prior.
 constexpr std::uint32_t kEvidenceFrom = 3;
 constexpr std::uint32_t kMixFrom = 4;
 constexpr std::uint32_t kJudgeFrom = 6;
 constexpr std::uint32_t kLearnFrom = 16;
 constexpr std::uint32_t kYoung = 100;
-constexpr std::uint8_t kRejectedInARow = 8;
-constexpr std::uint8_t kRejectedAtLeast = 3;
-constexpr double kRejected = 0.1;
 /// Where the noise is known: a host that stands still makes more than half of the window late now
 /// and then, and its milliseconds must not become the noise at once.
 constexpr double kLargestResidual = 30.0;
-constexpr double kSmallestScale = 1e-4;
 /// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
@@ -54,8 +47,13 @@ std::size_t index_of(Direction direction) noexcept {
 constexpr double kSurpriseShare = 1.0 / 6.0;
 constexpr double kUsualSurprise = 1.6;
 constexpr double kSurpriseLimit = 100.0;
-/// Measured: the bias under one-way load is 2.5 % of the tail, i.e. 5 % of half of it.
-constexpr double kFloorDoubt = 0.06;
+/// The sharpest shape tried has a normal part of a seventh of the tail. Where that is the best
+/// shape the true edge is anything between that soft and as sharp as can be, and then the filter
+/// puts the floor 5.4 % of the tail too late (measured). Taken back is the middle; what is open is
+/// as much.
+constexpr double kEdgeBias = 0.027;
+constexpr double kFloorDoubt = 0.03;
+constexpr double kSharpest = 0.97;
 
 double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
 
@@ -76,8 +74,10 @@ bool Estimator<Grid>::observable() const noexcept {
 template <class Grid>
 void Estimator<Grid>::restart() noexcept {
   const KnownDelay delay = known_delay_;
+  const double least_noise = least_noise_;
   ::new (static_cast<void*>(this))
       Estimator(delay);  // in place: too large for the stack of a real-time thread
+  least_noise_ = least_noise;
 }
 
 /// Kept in the mixed estimate, which nobody else needs before the first message.
@@ -89,7 +89,7 @@ void Estimator<Grid>::expect(const RatePrior& rate, double noise_ns) noexcept {
 }
 
 template <class Grid>
-void Estimator<Grid>::begin(Direction direction) noexcept {
+void Estimator<Grid>::begin(std::size_t side) noexcept {
   Estimate start;
   start.xx = kOffsetPrior;
   start.y = mixed_.y;
@@ -99,7 +99,7 @@ void Estimator<Grid>::begin(Direction direction) noexcept {
     start.dd = known_delay_.sigma_ns * known_delay_.sigma_ns / (scale_ * scale_);
   }
   bank_.start(start);
-  seen_[index_of(direction)] = true;
+  seen_[side] = true;
   best_ = Grid::kStart;
 }
 
@@ -107,8 +107,7 @@ void Estimator<Grid>::begin(Direction direction) noexcept {
 /// covariances). The first message of the other direction sets it free:
 /// x = (x + sign d) - sign d.
 template <class Grid>
-void Estimator<Grid>::connect_second_direction(Direction direction) noexcept {
-  const std::size_t side = index_of(direction);
+void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
   if (known_delay_.known()) return;
@@ -143,23 +142,32 @@ void Estimator<Grid>::shift_offset(double shift_ns) noexcept {
 }
 
 template <class Grid>
-double Estimator<Grid>::update(Direction direction, const Observation& seen) noexcept {
-  const std::size_t side = index_of(direction);
+double Estimator<Grid>::update(const Observation& seen) noexcept {
+  const double credit = step(seen);
+  if (!diverged_) return credit;
+  const LastMessages last = second_opinion_.last();  // without this one
+  restart();
+  for (std::size_t k = 0; k < last.count; ++k) (void)step(last.messages[k]);
+  return step(seen);
+}
+
+template <class Grid>
+double Estimator<Grid>::step(const Observation& seen) noexcept {
+  const std::size_t side = seen.sign > 0.0 ? 0 : 1;
   const double elapsed = count_ == 0 ? 0.0 : seen.elapsed;
-  if (count_ == 0) begin(direction);
-  connect_second_direction(direction);
+  if (count_ == 0) begin(side);
+  connect_second_direction(side);
   ++count_;
   ++since_change_;
   if (!bank_.predict(elapsed, best_) && count_ > kMixFrom) {
     restart();
     return 0.0;
   }
-  const OutlierPrior outliers{late_outliers_[side], kEarlyOutliers};
+  const OutlierPrior outliers{gate_.late_outliers(side), kEarlyOutliers};
   const Innovations innovations =
       bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
   if (count_ > kLearnFrom) {
-    const bool delay_free = two_way() && !known_delay_.known();
-    jumps_.follow({seen, shape_[side], scale_, outliers, process_, two_way(), delay_free,
+    jumps_.follow({seen, shape_[side], scale_, outliers, process_, two_way(), delay_free(),
                    bank_.estimate(best_), innovations.distance[best_],
                    innovations.log_density[best_]});
   }
@@ -179,14 +187,14 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
   if (count_ > kJudgeFrom) {
-    double& late = late_outliers_[side];
-    late =
-        std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
+    gate_.learn(side, credit);
     lateness_.observe(side, innovations.centred[best_] > 0.0, innovations.distance[best_]);
     detect_changes(innovations.log_density);
   }
-  follow_gate(side, credit, innovation);
-  if (count_ == 0) return 0.0;
+  if (follow_gate(side, credit, innovation)) {
+    if (count_ == 0 || diverged_) return 0.0;
+    hear_again(seen, outliers);
+  }
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
     const double size = std::sqrt(innovations.distance[best_]);
@@ -211,43 +219,56 @@ double Estimator<Grid>::update(Direction direction, const Observation& seen) noe
   return credit;
 }
 
+/// Not inlined: its innovations would lie on the stack of every message.
+template <class Grid>
+[[gnu::noinline]] void Estimator<Grid>::hear_again(const Observation& seen,
+                                                   const OutlierPrior& outliers) noexcept {
+  const DelayShape& shape = shape_[seen.sign > 0.0 ? 0 : 1];
+  bank_.correct(seen, scale_, bank_.judge(seen, shape, scale_, outliers, true));
+}
+
 template <class Grid>
 void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innovation) noexcept {
   second_opinion_.push(seen, innovation);
-  const int rejected = std::max(rejected_[0], rejected_[1]);
-  if (rejected >= kSurprises || second_opinion_.serial() >= kSurprises) surprise_ = kOpinionWhile;
+  if (gate_.most_rejected() >= kSurprises || second_opinion_.serial() >= kSurprises)
+    surprise_ = kOpinionWhile;
   const bool due = count_ <= kOpinionOften || count_ % kOpinionPeriod == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
-  const bool delay_free = two_way() && !known_delay_.known();
-  const bool young = count_ <= kOpinionOften && second_opinion_.full();
+  const bool young =
+      (count_ <= kOpinionOften || evidence_.messages() < kOpinionOften) && second_opinion_.full();
   const double contradiction = young ? kYoungContradiction : kContradiction;
-  const FreshFit fit = second_opinion_.consult({delay_free, known_delay_.mean_ns, contradiction});
+  const FreshFit fit = second_opinion_.consult({delay_free(), known_delay_.mean_ns, contradiction});
   if (fit.better) start_again(fit);
+}
+
+/// All filters from one estimate; what spoke for a change has been heard.
+template <class Grid>
+void Estimator<Grid>::begin_anew(const Estimate& start) noexcept {
+  bank_.start(start);
+  detector_.clear();
+  jumps_.clear();
+  lateness_.clear();
+  gate_.explained();
+  since_change_ = 0;
 }
 
 template <class Grid>
 void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   Estimate start = fit.estimate;
-  scale_ = robust_scale_ = fit.scale_ns;
+  scale_ = robust_scale_ = std::max(fit.scale_ns, least_noise_);
   if (known_delay_.known()) {
     const double sigma = known_delay_.sigma_ns / scale_;
     start.dd = sigma * sigma;
     start.xx += start.dd;
   }
-  bank_.start(start);
-  detector_.clear();
-  jumps_.clear();
-  lateness_.clear();
+  begin_anew(start);
   for (auto& learner : learner_) learner.restart();
   shape_ = {};
-  late_outliers_ = {kOutlierStart, kOutlierStart};
-  rejected_ = {};
-  taken_ = {};
+  gate_ = {};
   residuals_.clear();
   evidence_.forget();
   second_opinion_.adopt(start);
-  since_change_ = 0;
   surprise_ = 0;
   surprise_level_ = 1.0;
   count_ = kJudgeFrom;
@@ -259,11 +280,7 @@ void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
   const auto jump = jumps_.judge(detector_.lead(best_));
   if (jump == JumpWatch::Verdict::kWait) return;
   if (jump == JumpWatch::Verdict::kJumped) {  // rate and noise are known as before
-    bank_.start(jumps_.estimate());
-    detector_.clear();
-    jumps_.clear();
-    lateness_.clear();
-    since_change_ = 0;
+    begin_anew(jumps_.estimate());
     return;
   }
   const bool sudden = !two_way() || lateness_.speaks_of_clock();
@@ -275,6 +292,7 @@ void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
     if (source == ChangeDetector<Grid>::kNone) continue;
     bank_.set(i, bank_.estimate(source));
     if (i != best_) continue;
+    jumps_.clear();  // they were measured against what is no longer believed
     since_change_ = 0;
     if (count_ < kYoung) {  // a bad start must leave no trace
       for (auto& learner : learner_) learner.restart();
@@ -284,31 +302,26 @@ void Estimator<Grid>::detect_changes(const Row& log_density) noexcept {
   }
 }
 
-/// Eight messages of one direction in a row cannot all be outliers, nor can more than were ever
-/// taken: the gate opens.
+/// True if this message is to be heard once more, or if what was believed is worth nothing.
 template <class Grid>
-void Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
-  std::uint8_t& rejected = rejected_[side];
-  std::uint8_t& taken = taken_[side];
-  if (credit >= kRejected) {
-    rejected = 0;
-    taken = std::min<std::uint8_t>(static_cast<std::uint8_t>(taken + 1), kRejectedInARow);
-    return;
-  }
-  ++rejected;
-  if (rejected < std::max(kRejectedAtLeast, std::min(kRejectedInARow, taken))) return;
-  rejected = 0;
+bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
+  const Gate::Verdict verdict = gate_.observe(side, credit, innovation < 0.0, since_change_);
+  if (verdict == Gate::Verdict::kShut) return false;
+  diverged_ = verdict == Gate::Verdict::kDiverged;
+  if (diverged_) return true;
   const double doubt = innovation * innovation / (scale_ * scale_);
-  if (!(doubt < Bank::kLargestVariance)) {  // nothing of what was believed is left
+  if (!(doubt < Bank::kLargestVariance)) {
     restart();
-    return;
+    return true;
   }
-  const bool delay_free = two_way() && !known_delay_.known();
-  const bool clock = !delay_free || lateness_.speaks_of_clock();
+  const bool certain = verdict == Gate::Verdict::kCertain;
+  const bool delay_free = this->delay_free();
+  const bool clock = !delay_free || certain || lateness_.speaks_of_clock();
   bank_.for_each([=](Estimate& e) {
     if (clock) e.xx += doubt;
     if (delay_free) e.dd += doubt;
   });
+  return certain;
 }
 
 template <class Grid>
@@ -322,16 +335,32 @@ void Estimator<Grid>::choose() noexcept {
   weight_[best_] = 1.0;
 }
 
+/// ns by which the filters put the floor of a direction too late.
+template <class Grid>
+double Estimator<Grid>::edge_bias_ns(std::size_t side) const noexcept {
+  const DelayShape& shape = shape_[side];
+  const bool sharp = shape.tail * shape.tail > kSharpest * shape.total_variance();
+  return sharp ? kEdgeBias * shape.tail * scale_ : 0.0;
+}
+
 template <class Grid>
 void Estimator<Grid>::mix() noexcept {
   mixed_ = bank_.mixture(weight_, scale_);
+  const double ahead = edge_bias_ns(0);
+  const double back = edge_bias_ns(1);
+  if (delay_free()) {
+    mixed_.x -= (ahead - back) / 2.0;
+    mixed_.d -= (ahead + back) / 2.0;
+  } else {
+    mixed_.x -= ahead - back;
+  }
   process_ = bank_.mean_noise(weight_);
 }
 
 template <class Grid>
 void Estimator<Grid>::follow_scale() noexcept {
   if (residuals_.size() > 0) {
-    robust_scale_ = std::max(kSmallestScale, kMadToSigma * residuals_.median());
+    robust_scale_ = std::max(least_noise_, kMadToSigma * residuals_.median());
   }
   if (evidence_.messages() > 4.0 &&
       evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
@@ -339,7 +368,7 @@ void Estimator<Grid>::follow_scale() noexcept {
     // without evidence any other might be chosen.
     evidence_.forget();
     const Estimate coped = bank_.estimate(best_);
-    if (residuals_.full()) bank_.for_each([&coped](Estimate& e) { e = coped; });
+    bank_.for_each([&coped](Estimate& e) { e = coped; });
   }
   // Fourth root of both directions' variances: the scale is their geometric mean.
   double learnt = 1.0;
@@ -372,12 +401,13 @@ void Estimator<Grid>::adopt_shapes() noexcept {
     ++sides;
     const double old_tail = scale_ * shape_[side].tail;
     in_ns[side] = learner_[side].decide();
-    product *= std::max(in_ns[side].total_variance(), kSmallestScale * kSmallestScale);
+    in_ns[side].variance = std::max(in_ns[side].variance, least_noise_ * least_noise_);
+    product *= in_ns[side].total_variance();
     const bool switched = (old_tail > 0.0) != (in_ns[side].tail > 0.0);
     if (!switched) continue;
     const double shift = in_ns[side].tail - old_tail;
     const double sign = sign_of(side);
-    const bool delay_free = two_way() && !known_delay_.known();
+    const bool delay_free = this->delay_free();
     const double doubt = 0.09 * shift * shift / (scale_ * scale_) / (delay_free ? 4.0 : 1.0);
     bank_.for_each([=](Estimate& e) {
       if (delay_free) {
@@ -405,7 +435,7 @@ template <class Grid>
 void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
   const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
   const double credit = innovations.credit[best_];
-  const double unexpected = std::max(0.0, 1.0 - late_outliers_[side] / kOutlierStart);
+  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / Gate::kOutlierStart);
   const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);
   surprise_level_ += kSurpriseShare * (level - surprise_level_);
 }

@@ -9,6 +9,7 @@
 #include "ftcs/servo/adaptive/change_detector.h"
 #include "ftcs/servo/adaptive/delay_shape.h"
 #include "ftcs/servo/adaptive/evidence.h"
+#include "ftcs/servo/adaptive/gate.h"
 #include "ftcs/servo/adaptive/jump_watch.h"
 #include "ftcs/servo/adaptive/lateness.h"
 #include "ftcs/servo/adaptive/model_bank.h"
@@ -45,8 +46,11 @@ class Estimator {
   /// start as any other; the rate counts as much as its sigma says.
   void expect(const RatePrior& rate, double noise_ns) noexcept;
 
+  /// No noise is smaller than this, ns: what rounds the timestamps makes some.
+  void expect_noise_of_at_least(double noise_ns) noexcept { least_noise_ = noise_ns; }
+
   /// Returns the probability that the message is no outlier.
-  double update(Direction direction, const Observation& seen) noexcept;
+  double update(const Observation& seen) noexcept;
 
   /// At the event of the last message; covariances in units of scale().
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
@@ -76,18 +80,23 @@ class Estimator {
   using Innovations = typename Bank::Innovations;
   static constexpr std::size_t kSize = Grid::kSize;
 
-  void begin(Direction direction) noexcept;
-  void connect_second_direction(Direction direction) noexcept;
+  double step(const Observation& seen) noexcept;
+  void begin(std::size_t side) noexcept;
+  void connect_second_direction(std::size_t side) noexcept;
   void detect_changes(const Row& log_density) noexcept;
-  void follow_gate(std::size_t side, double credit, double innovation) noexcept;
+  [[nodiscard]] bool follow_gate(std::size_t side, double credit, double innovation) noexcept;
+  void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
   void choose() noexcept;
+  [[nodiscard]] double edge_bias_ns(std::size_t side) const noexcept;
   void mix() noexcept;
   void follow_scale() noexcept;
-  void learn_noise(std::size_t side, double innovation) noexcept;
   void adopt_shapes() noexcept;
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
+  void begin_anew(const Estimate& start) noexcept;
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
+  /// The path delay is estimated, not given or pinned.
+  [[nodiscard]] bool delay_free() const noexcept { return two_way() && !known_delay_.known(); }
   void follow_surprise(std::size_t side, const Innovations& innovations) noexcept;
   [[nodiscard]] double widening() const noexcept;
   [[nodiscard]] double floor_doubt_ns() const noexcept;
@@ -99,10 +108,8 @@ class Estimator {
   Lateness lateness_{};
   std::array<NoiseLearner<Grid::kNoiseWindow>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};
-  std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};
   std::array<bool, 2> seen_{};
-  std::array<std::uint8_t, 2> rejected_{};  ///< in a row
-  std::array<std::uint8_t, 2> taken_{};     ///< up to as many as would open the gate
+  Gate gate_{};
   SortedWindow<Grid::kResidualWindow> residuals_{};
   SecondOpinion<Grid::kOpinionWindow> second_opinion_{};
 
@@ -111,15 +118,15 @@ class Estimator {
   std::size_t best_ = Grid::kStart;
   std::uint32_t count_ = 0;
   std::uint32_t since_change_ = 0;
+  bool diverged_ = false;
   std::uint8_t surprise_ = 0;  ///< messages for which the second opinion is still sought
   double scale_ = 100.0;
   double robust_scale_ = 100.0;
+  double least_noise_ = 1e-4;
   double gain_ = 1.0;
   double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations
   NoiseModel process_{};         ///< mean of the models' noise under their weights
   Estimate mixed_{};
-
-  static constexpr double kOutlierStart = 0.03;
 };
 
 }  // namespace ftcs::adaptive

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -71,7 +72,7 @@ Ratio compare(double a, double b, int runs, int cycles) {
       }
       const double z = x + normal(random);
       bound.update(z);
-      (void)estimator.update(Direction::kForward, {1.0, n == 0 ? 0.0 : 1.0, z * kNoise});
+      (void)estimator.update({1.0, n == 0 ? 0.0 : 1.0, z * kNoise});
       const double r1 = normal(random);
       const double r2 = normal(random);
       const double white = std::sqrt(a) * normal(random);
@@ -100,12 +101,12 @@ TEST(Estimator, a_second_direction_separates_offset_and_delay) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0.0, 10.0);
   for (int n = 0; n < 10; ++n) {
-    (void)estimator.update(Direction::kForward, {1.0, 1.0, 5000.0 + 700.0 + normal(random)});
+    (void)estimator.update({1.0, 1.0, 5000.0 + 700.0 + normal(random)});
   }
   EXPECT_NEAR(estimator.estimate().x, 5700.0, 40.0) << "one direction cannot tell them apart";
   for (int n = 0; n < 10; ++n) {
-    (void)estimator.update(Direction::kBackward, {-1.0, 0.5, 5000.0 - 700.0 + normal(random)});
-    (void)estimator.update(Direction::kForward, {1.0, 0.5, 5000.0 + 700.0 + normal(random)});
+    (void)estimator.update({-1.0, 0.5, 5000.0 - 700.0 + normal(random)});
+    (void)estimator.update({1.0, 0.5, 5000.0 + 700.0 + normal(random)});
   }
   EXPECT_NEAR(estimator.estimate().x, 5000.0, 20.0);
   EXPECT_NEAR(estimator.estimate().d, 700.0, 20.0);
@@ -116,13 +117,114 @@ TEST(Estimator, the_gain_falls_by_itself) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0.0, kNoise);
   for (int n = 0; n < 400; ++n) {
-    (void)estimator.update(Direction::kForward, {1.0, 1.0, 50.0 * n + normal(random)});
+    (void)estimator.update({1.0, 1.0, 50.0 * n + normal(random)});
     if (n == 1) {
       EXPECT_GT(estimator.gain(), 0.99) << "deadbeat at the start";
     }
   }
   EXPECT_LT(estimator.gain(), 0.05);
   EXPECT_NEAR(estimator.noise_ns(Direction::kForward), kNoise, 12.0);
+}
+
+/// Two directions in turn, half a cycle apart, as a network with one path delay brings them.
+class TwoWay {
+ public:
+  explicit TwoWay(std::uint64_t seed = 1) : random_(seed) {}
+  void run(int messages) {
+    for (int n = 0; n < messages; ++n) {
+      forward_ = !forward_;
+      offset += 0.5 * rate;
+      const double sign = forward_ ? 1.0 : -1.0;
+      const bool queues = forward_ && queue > 0.0;
+      const double late = queues ? queue * exponential_(random_) : noise * normal_(random_);
+      const double spike = uniform_(random_) < spikes ? 100'000.0 : 0.0;
+      const double delay = (forward_ ? ahead : back) + late + spike;
+      (void)estimator.update({sign, 0.5, offset + sign * delay});
+    }
+  }
+  [[nodiscard]] double error() const { return estimator.estimate().x - offset; }
+
+  Estimator<FullGrid> estimator;
+  double offset = 0.0, rate = 50.0, ahead = 10'000.0, back = 10'000.0, noise = 10.0;
+  double spikes = 0.0;  ///< share of messages that are 100 us late
+  double queue = 0.0;  ///< of forward messages: mean of an exponential delay, in place of the noise
+
+ private:
+  std::mt19937_64 random_;
+  std::exponential_distribution<double> exponential_;
+  std::uniform_real_distribution<double> uniform_;
+  std::normal_distribution<double> normal_;
+  bool forward_ = false;
+};
+
+TEST(Estimator, a_direction_that_became_longer_is_believed_at_its_sixth_message) {
+  TwoWay world;
+  world.run(200);
+  EXPECT_NEAR(world.error(), 0.0, 10.0);
+  world.ahead += 40'000.0;
+  world.run(10);
+  EXPECT_NEAR(world.error(), 0.0, 20.0) << "five may be outliers";
+  world.run(1);
+  EXPECT_NEAR(world.error(), 20'000.0, 100.0) << "nobody can tell it from half an offset";
+}
+
+TEST(Estimator, a_clump_of_late_messages_taken_for_a_longer_path_is_taken_back) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    TwoWay world(seed);
+    world.noise = 100.0;
+    world.spikes = 0.1;
+    world.run(600);
+    world.spikes = 1.0;
+    world.run(7);
+    world.spikes = 0.0;
+    for (int n = 0; n < 30; ++n) {
+      world.run(1);
+      EXPECT_NEAR(world.error(), 0.0, 1000.0) << "seed " << seed << ", message " << n;
+    }
+  }
+}
+
+TEST(Estimator, recovers_within_twenty_messages_where_nothing_is_as_believed) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    TwoWay world(seed);
+    world.ahead = world.back = 86'000.0;
+    world.run(40);
+    world.offset += 22'000.0;
+    world.ahead = world.back = 50'000.0;
+    world.noise = 5000.0;
+    world.run(15);
+    for (int n = 0; n < 20; ++n) {
+      world.run(1);
+      EXPECT_NEAR(world.error(), 0.0, 10.0 * world.noise) << "seed " << seed;
+    }
+  }
+}
+
+TEST(Estimator, messages_that_agree_to_the_digit_by_luck_are_no_measure_of_the_noise) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    TwoWay world(seed);
+    world.estimator.expect_noise_of_at_least(0.4);
+    world.noise = 0.0;
+    world.run(8);
+    world.noise = 1.0;
+    for (int n = 0; n < 60; ++n) {
+      world.run(1);
+      EXPECT_NEAR(world.error(), 0.0, 4.0) << "seed " << seed;
+    }
+  }
+}
+
+TEST(Estimator, a_queue_with_a_sharp_edge_hardly_moves_the_offset) {
+  double sum = 0.0;
+  constexpr int kRuns = 40;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    TwoWay world(seed);
+    world.noise = 100.0;
+    world.queue = 1000.0;
+    world.run(2400);
+    sum += world.error();
+  }
+  EXPECT_NEAR(sum / kRuns, 0.0, 20.0) << "27 without the correction of the edge";
 }
 
 }  // namespace

@@ -106,10 +106,10 @@ class Evidence {
   /// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
   /// then the calmer of two models that explain the same is the better bet. More than this costs
   /// oscillators that do wander slowly.
-  static constexpr double kCalmGain = 0.08;
+  static constexpr double kCalmGain = 0.3;
   /// Twice nats for the one model of a slow wander that is too fast for the five nearly constant
   /// ones to stand in for it, and whose own neighbours cost 10 to 40 %: against their number.
-  static constexpr double kFavour = 0.7;
+  static constexpr double kFavour = 1.7;
   static constexpr Row kPlaceCost = []() constexpr {
     Row row{};
     for (std::size_t i = 0; i < kSize; ++i) {

@@ -37,7 +37,7 @@ class Oracle {
     for (std::size_t i = 0; i < Grid::kSize; ++i) {
       const double places = static_cast<double>(i) - static_cast<double>(Grid::kStart);
       const double cost = messages_ * std::log(squares_[i] / messages_) + logs_[i] +
-                          (places > 0.0 ? 1.0 : 0.08) * places - (i == Grid::kFavoured ? 0.7 : 0.0);
+                          (places > 0.0 ? 1.0 : 0.3) * places - (i == Grid::kFavoured ? 1.7 : 0.0);
       weight[i] = std::exp(-0.5 * (cost - kReference));
       sum += weight[i];
     }

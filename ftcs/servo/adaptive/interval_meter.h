@@ -34,17 +34,17 @@ class IntervalMeter {
     side.seen = true;
     if (!measured) return 1.0;
     if (known_ && elapsed > interval_ns_ / kTolerance && elapsed < interval_ns_ * kTolerance) {
-      if (forward) doubt_ = 0;
+      if (forward) trust();
       return 1.0;
     }
-    if (forward || doubt_ == 0 || !forward_contradicts_) candidate_ns_ = elapsed;
-    forward_contradicts_ = forward || (doubt_ > 0 && forward_contradicts_);
+    if (forward || !forward_contradicts_) candidate_ns_ = elapsed;
+    forward_contradicts_ = forward_contradicts_ || forward;
     doubt_ = static_cast<std::uint8_t>(doubt_ + (forward ? 2 : 1));
     if (doubt_ < (known_ ? kEnough : kEnoughAtFirst)) return 1.0;
     const double factor = candidate_ns_ / interval_ns_;
     interval_ns_ = candidate_ns_;
     known_ = true;
-    doubt_ = 0;
+    trust();
     return factor;
   }
   [[nodiscard]] double interval_ns() const noexcept { return interval_ns_; }
@@ -58,6 +58,11 @@ class IntervalMeter {
   }
 
  private:
+  void trust() noexcept {
+    doubt_ = 0;
+    forward_contradicts_ = false;
+  }
+
   struct Side {
     ReferenceTime latest{};
     float span_ns = 0.0F;  ///< since the first

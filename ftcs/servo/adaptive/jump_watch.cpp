@@ -72,6 +72,7 @@ void JumpHypothesis::judge(const JumpMessage& message) noexcept {
 }
 
 void JumpHypothesis::follow(const JumpMessage& message) noexcept {
+  if (!alive_ && message.distance < kFar) return;  // almost always
   if (alive_) {
     predict(message);
     judge(message);

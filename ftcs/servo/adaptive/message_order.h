@@ -54,6 +54,10 @@ class MessageOrder {
   [[nodiscard]] double tick_variance_ns2() const noexcept {
     return reference_tick_.variance_ns2() + free_running_tick_.variance_ns2();
   }
+  /// Noise that rounding makes in a message, ns: at least that of whole nanoseconds.
+  [[nodiscard]] double rounding_ns() const noexcept {
+    return std::sqrt(reference_tick_.rounding_ns2() + free_running_tick_.rounding_ns2());
+  }
 
  private:
   /// Whole nanoseconds suffice to tell two messages apart.

@@ -89,6 +89,19 @@ void SecondOpinion<Capacity>::adopt(const Estimate& line) noexcept {
   for (Message& message : messages_) message.innovation = residual(message, line);
 }
 
+template <std::size_t Capacity>
+LastMessages SecondOpinion<Capacity>::last() const noexcept {
+  LastMessages last;
+  last.count = std::min(size_, last.messages.size());
+  double before = 0.0;
+  for (std::size_t k = 0; k < last.count; ++k) {
+    const Message& m = messages_[(next_ + Capacity - last.count + k) % Capacity];
+    last.messages[k] = {m.sign, k == 0 ? 0.0 : m.time - before, m.z};
+    before = m.time;
+  }
+  return last;
+}
+
 /// Least squares of z on (1, t, sign), time relative to the newest message; covariance in units of
 /// the squared residual scale.
 template <std::size_t Capacity>

@@ -26,6 +26,12 @@ struct OpinionQuestion {
   double contradiction = 10.0;
 };
 
+/// So many as can make filters diverge.
+struct LastMessages {
+  std::array<Observation, 7> messages{};
+  std::size_t count = 0;
+};
+
 /// Keeps the last messages and, now and then, fits them anew without any memory:
 ///
 ///     z = x + y t + sign d,   least trimmed squares over three quarters of them
@@ -44,6 +50,8 @@ class SecondOpinion {
   /// noise is not like that.
   [[nodiscard]] int serial() const noexcept { return std::max(alike_[0], alike_[1]); }
   [[nodiscard]] FreshFit consult(const OpinionQuestion& question) const noexcept;
+  /// The last messages, the newest last.
+  [[nodiscard]] LastMessages last() const noexcept;
   /// The filters start again from `line`: what they had thought of these messages is void.
   void adopt(const Estimate& line) noexcept;
   void clear() noexcept { *this = SecondOpinion{}; }
@@ -94,6 +102,7 @@ class SecondOpinion<0> {
   [[nodiscard]] bool full() const noexcept { return true; }
   [[nodiscard]] int serial() const noexcept { return 0; }
   [[nodiscard]] FreshFit consult(const OpinionQuestion&) const noexcept { return {}; }
+  [[nodiscard]] LastMessages last() const noexcept { return {}; }
   void adopt(const Estimate&) noexcept {}
   void rescale_time(double) noexcept {}
   void shift_offset(double) noexcept {}

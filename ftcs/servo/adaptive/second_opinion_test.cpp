@@ -90,5 +90,23 @@ TEST_F(SecondOpinionTest, one_direction_with_a_known_delay_suffices) {
   EXPECT_DOUBLE_EQ(fit.estimate.d, kD);
 }
 
+TEST_F(SecondOpinionTest, gives_the_last_messages_in_their_order) {
+  for (int i = 0; i < 3; ++i) feed(0.0, 0.0);
+  const LastMessages few = opinion_.last();
+  ASSERT_EQ(few.count, 3U);
+  EXPECT_EQ(few.messages[0].sign, 1.0);
+  EXPECT_EQ(few.messages[0].elapsed, 0.0) << "nothing is before it";
+
+  for (int i = 0; i < 18; ++i) feed(0.0, 0.0);
+  const Observation newest{-1.0, 0.25, 12'345.0};
+  opinion_.push(newest, 0.0);
+  const LastMessages all = opinion_.last();
+  ASSERT_EQ(all.count, all.messages.size());
+  EXPECT_EQ(all.messages.back().z, newest.z);
+  EXPECT_EQ(all.messages.back().sign, newest.sign);
+  EXPECT_DOUBLE_EQ(all.messages.back().elapsed, newest.elapsed);
+  EXPECT_DOUBLE_EQ(all.messages[1].elapsed, 0.5);
+}
+
 }  // namespace
 }  // namespace ftcs::adaptive

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <numeric>
@@ -22,12 +23,16 @@ class TickMeter {
   }
   /// Variance of an error spread evenly over a step, ns^2.
   [[nodiscard]] double variance_ns2() const noexcept {
-    if (step_ns_ <= 1 || step_ns_ > kCoarsest) return 0.0;
-    const double step = static_cast<double>(step_ns_);
-    return step * step / 12.0;
+    return step_ns_ <= 1 || step_ns_ > kCoarsest ? 0.0 : even(step_ns_);
   }
+  /// The same with a step of one nanosecond at least.
+  [[nodiscard]] double rounding_ns2() const noexcept { return std::max(variance_ns2(), even(1)); }
 
  private:
+  [[nodiscard]] static double even(std::uint32_t step_ns) noexcept {
+    const double step = step_ns;
+    return step * step / 12.0;
+  }
   static constexpr std::uint32_t kCoarsest = 20'000;
   std::uint32_t step_ns_ = 0;  ///< greatest common divisor; 0: no difference yet
 };

@@ -14,6 +14,7 @@ TEST(TickMeter, finds_the_step_of_a_coarse_clock) {
     meter.observe(ticks * 8);
   }
   EXPECT_DOUBLE_EQ(meter.variance_ns2(), 64.0 / 12.0);
+  EXPECT_DOUBLE_EQ(meter.rounding_ns2(), 64.0 / 12.0);
 }
 
 TEST(TickMeter, takes_nanoseconds_for_exact_for_good) {
@@ -22,6 +23,7 @@ TEST(TickMeter, takes_nanoseconds_for_exact_for_good) {
   meter.observe(1'000'000'010);
   for (int i = 0; i < 10; ++i) meter.observe(8'000);
   EXPECT_EQ(meter.variance_ns2(), 0.0);
+  EXPECT_DOUBLE_EQ(meter.rounding_ns2(), 1.0 / 12.0) << "but noise of less than that is luck";
 }
 
 TEST(TickMeter, a_schedule_is_no_step) {

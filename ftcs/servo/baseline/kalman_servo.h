@@ -15,7 +15,7 @@ struct KalmanConfig {
   baseline::KalmanNoise noise{};
   std::optional<Nanoseconds> fixed_path_delay{};  ///< known otherwise: the two-state filter
   /// T_c as a part of the sync interval.
-  double correction_share = 0.25;
+  double correction_share = 0.125;
   RateLimits limits{};
 };
 
