@@ -60,6 +60,18 @@ TEST(DelayFilter, impossible_lengths_become_the_nearest_possible) {
   EXPECT_EQ(too_long.value(), Duration::from_ns(2.0));
 }
 
+TEST(DelayFilter, steady_mean_is_the_median_until_all_have_come) {
+  auto steady = filter(DelayFilterKind::kSteadyMean, 1);  // that is, five
+  for (const double ns : {9.0, 1.0, 2.0, 4.0}) steady.add(Duration::from_ns(ns));
+  EXPECT_EQ(steady.value(), Duration::from_ns(3.0));
+  steady.add(Duration::from_ns(3.0));
+  EXPECT_EQ(steady.value(), Duration::from_ns(3.0));
+  steady.reset();
+  EXPECT_TRUE(steady.empty());
+  steady.add(Duration::from_ns(50.0));
+  EXPECT_EQ(steady.value(), Duration::from_ns(50.0)) << "nothing is left of the values before";
+}
+
 TEST(DelayFilter, default_is_the_median_of_ten) {
   DelayFilter median{DelayFilterConfig{}};
   for (const double ns : {9.0, 1.0, 1.0, 1.0, 1.0, 3.0, 5.0, 5.0, 5.0, 5.0, 5.0})

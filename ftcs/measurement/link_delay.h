@@ -22,6 +22,7 @@ class LinkDelay {
     filter_.add(mean_link_delay);
     return true;
   }
+  void reset() noexcept { filter_.reset(); }
   [[nodiscard]] bool known() const noexcept { return !filter_.empty(); }
   /// Filtered; zero until known.
   [[nodiscard]] Duration value() const noexcept { return filter_.value(); }
