@@ -9,52 +9,22 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/clock/virtual_clock.h"
 #include "test/support/forbid_allocation.h"
+#include "test/support/manual_source.h"
+#include "test/support/watched_clock.h"
 
 namespace ftcs {
 namespace {
 using namespace std::chrono_literals;
+using test::WatchedClock;
 
 constexpr Nanoseconds kInterval = 125ms;
-
-class ManualOscillator final : public FreeRunningSource {
- public:
-  [[nodiscard]] FreeRunningTime now() noexcept override { return now_; }
-  void advance(Duration elapsed) noexcept { now_ = now_ + elapsed; }
-
- private:
-  FreeRunningTime now_ = FreeRunningTime::from_ns(1'000'000'000);
-};
-
-/// A virtual clock that can be told to refuse commands, and that notes what it was told.
-class WatchedClock final : public AdjustableClock {
- public:
-  WatchedClock(FreeRunningSource& source, Duration offset, RateLimits limits)
-      : clock_(source,
-               {source.now(), LocalTime{source.now().since_epoch() + offset}, Rate{}, limits}) {}
-
-  [[nodiscard]] ClockReading read() noexcept override { return clock_.read(); }
-  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept override {
-    return clock_.local_at(instant);
-  }
-  [[nodiscard]] RateLimits rate_limits() const noexcept override { return clock_.rate_limits(); }
-  [[nodiscard]] Result<ClockReading, ClockError> apply(
-      const ServoCommand& command) noexcept override {
-    if (refuse) return ClockError::kBusy;
-    last = command;
-    return clock_.apply(command);
-  }
-
-  bool refuse = false;
-  ServoCommand last{};
-
- private:
-  VirtualClock clock_;
-};
+constexpr FreeRunningTime kStart = FreeRunningTime::from_ns(1'000'000'000);
 
 class ClockDisciplineTest : public ::testing::Test {
  protected:
+  ClockDisciplineTest() { oscillator_.instant = kStart; }
+
   void start(Duration offset, const DisciplineConfig& config) {
     clock_.emplace(oscillator_, offset, RateLimits::symmetric_ppb(100e6));
     discipline_.emplace(config, *clock_);
@@ -68,7 +38,7 @@ class ClockDisciplineTest : public ::testing::Test {
   }
 
   [[nodiscard]] ReferenceTime reference() {
-    const Duration elapsed = oscillator_.now() - FreeRunningTime::from_ns(1'000'000'000);
+    const Duration elapsed = oscillator_.now() - kStart;
     return ReferenceTime::from_ns(1'000'000'000) + scale(elapsed, reference_rate_) +
            reference_jump_;
   }
@@ -78,7 +48,7 @@ class ClockDisciplineTest : public ::testing::Test {
   [[nodiscard]] EventPair forward() {
     return {Direction::kForward, reference(), oscillator_.now()};
   }
-  void advance(Duration elapsed) { oscillator_.advance(elapsed); }
+  void advance(Duration elapsed) { oscillator_.instant = oscillator_.instant + elapsed; }
   Telemetry sync() { return discipline_->on_pair(forward()); }
   /// One message now, then an interval without any.
   Telemetry sync_and_wait() {
@@ -87,7 +57,7 @@ class ClockDisciplineTest : public ::testing::Test {
     return telemetry;
   }
 
-  ManualOscillator oscillator_;
+  test::ManualSource oscillator_;
   Rate reference_rate_{};
   Duration reference_jump_{};
   std::optional<WatchedClock> clock_;

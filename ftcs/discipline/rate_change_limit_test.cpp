@@ -3,14 +3,13 @@
 // discipline that was told by how much the rate may change at a time. The clock notes every change.
 #include "ftcs/discipline/rate_change_limit.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "test/support/manual_source.h"
+#include "test/support/watched_clock.h"
 
 namespace ftcs {
 namespace {
@@ -18,36 +17,6 @@ using namespace std::chrono_literals;
 
 constexpr double kLimit = 10e-6;
 constexpr double kRounding = 1e-13;
-
-/// Knows the largest change of its rate: by a command, or by the end of a correction.
-class WatchedClock final : public AdjustableClock {
- public:
-  explicit WatchedClock(FreeRunningSource& source)
-      : source_(source), clock_(source, {source.now(), LocalTime::from_ns(100'000), {}, {}}) {}
-
-  [[nodiscard]] ClockReading read() noexcept override { return clock_.read(); }
-  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept override {
-    return clock_.local_at(instant);
-  }
-  [[nodiscard]] RateLimits rate_limits() const noexcept override { return clock_.rate_limits(); }
-  [[nodiscard]] Result<ClockReading, ClockError> apply(
-      const ServoCommand& command) noexcept override {
-    const double before = rate();
-    const double after = command.tracking_rate.ratio();
-    const double first = has_correction(command) ? command.correction_rate.ratio() : after;
-    largest_change = std::max({largest_change, std::abs(first - before), std::abs(after - first)});
-    last = command;
-    return clock_.apply(command);
-  }
-  [[nodiscard]] double rate() const { return clock_.history().rate_at(source_.now()).ratio(); }
-
-  double largest_change = 0.0;
-  ServoCommand last{};
-
- private:
-  FreeRunningSource& source_;
-  VirtualClock clock_;
-};
 
 struct World {
   explicit World(double limit, double granularity = 0.0, ServoKind kind = ServoKind::kAdaptive)
@@ -77,7 +46,7 @@ struct World {
   }
 
   test::ManualSource oscillator;
-  WatchedClock clock{oscillator};
+  test::WatchedClock clock{oscillator, Duration{100us}};
   ClockDiscipline discipline;
 };
 

@@ -121,7 +121,7 @@ Result<ClockDevice, OsError> ClockDevice::open_phc_of(Kernel& kernel, const std:
   const auto capabilities = interface_capabilities(kernel, interface);
   if (!capabilities) return capabilities.error();
   if (capabilities->phc_index < 0) {
-    return OsError{OsErrorKind::kTimestampingUnsupported, 0,
+    return OsError{OsErrorKind::kSystem, EOPNOTSUPP,
                    "interface " + interface + ": no PTP hardware clock"};
   }
   return open_phc(kernel, "/dev/ptp" + std::to_string(capabilities->phc_index), access);
@@ -167,7 +167,8 @@ std::optional<OsError> ClockDevice::probe_rights() {
   timex request{};
   request.modes = ADJ_TICK;
   const int result = kernel_->adjust_clock(id_, request);
-  if (result == -EPERM || result == -EACCES) return os_error(-result, "steering " + name_);
+  if (result == -EPERM || result == -EACCES)
+    return os_error(-result, "steering " + name_ + " (CAP_SYS_TIME)");
   return std::nullopt;
 }
 

@@ -11,8 +11,8 @@
 namespace ftcs::platform {
 
 /// FakeKernel with clocks that can be steered: CLOCK_REALTIME on the oscillator of
-/// CLOCK_MONOTONIC_RAW, and /dev/ptp0 on one of its own. Rates, steps and leaps are those of a
-/// kernel with infinitely short ticks; `ideal` time is what advance() counts.
+/// CLOCK_MONOTONIC_RAW, /dev/ptp0 and /dev/ptp1 on one of their own each. Rates, steps and leaps
+/// are those of a kernel with infinitely short ticks; `ideal` time is what advance() counts.
 class FakeClocks final : public FakeKernel {
  public:
   struct Clock {
@@ -35,6 +35,7 @@ class FakeClocks final : public FakeKernel {
   static constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
   Clock system;
   Clock phc;
+  Clock other_phc;  ///< /dev/ptp1
   double raw = 1e12;
   double ideal_ns = 0.0;
   std::int64_t max_adj_ppb = 50'000'000;
@@ -50,7 +51,7 @@ class FakeClocks final : public FakeKernel {
   bool short_cross_reads = false;
   bool run_folder_is_writable = true;
   bool device_numbers_known = true;
-  std::set<std::string> held_names;  ///< and locked descriptors; for good
+  std::set<std::string> held_names;  ///< and locked descriptors, until they are closed
   int commands = 0;                  ///< adjust_clock() calls that asked for a change and got it
   std::int64_t timer_ns = 0;
 
@@ -61,6 +62,7 @@ class FakeClocks final : public FakeKernel {
     raw += ns * system.oscillator;
     system.advance(ns);
     phc.advance(ns);
+    other_phc.advance(ns);
   }
   [[nodiscard]] static double relative(std::int64_t clock_ns) {
     return static_cast<double>(clock_ns - kEpoch);
@@ -73,7 +75,8 @@ class FakeClocks final : public FakeKernel {
     if (clock == CLOCK_MONOTONIC_RAW || clock == CLOCK_MONOTONIC) return std::llround(raw);
     if (phc_gone) return 0;
     run(static_cast<double>(phc_reading_ns) / 2);
-    const std::int64_t now = kEpoch + std::llround(phc.time_ns);
+    const Clock& read = clock == clock_id_of(kOtherPhcDescriptor) ? other_phc : phc;
+    const std::int64_t now = kEpoch + std::llround(read.time_ns);
     run(static_cast<double>(phc_reading_ns) / 2);
     return now;
   }
@@ -82,21 +85,30 @@ class FakeClocks final : public FakeKernel {
     if (run_folder_is_writable && name.starts_with("/run/")) {
       return name.find("realtime") != std::string::npos ? kLockDescriptor : kLockDescriptor + 1;
     }
-    const bool other_node = name == "/dev/ptp_node";
-    if (name != "/dev/ptp0" && name != "/dev/ptp_nic" && !other_node) return -ENOENT;
-    if (phc_open_errno != 0) return -phc_open_errno;
-    return other_node ? kOtherPhcDescriptor : kPhcDescriptor;
+    if (name.starts_with("/dev/ptp") && phc_open_errno != 0) return -phc_open_errno;
+    if (name == "/dev/ptp1") return kOtherPhcDescriptor;
+    if (name == "/dev/ptp_node") return kOtherNodeDescriptor;
+    return name == "/dev/ptp0" || name == "/dev/ptp_nic" ? kPhcDescriptor : -ENOENT;
   }
   int hold_name(const char* name) noexcept override {
-    return held_names.insert(name).second ? 900 : -EADDRINUSE;
+    if (!held_names.insert(name).second) return -EADDRINUSE;
+    holds_[next_hold_] = name;
+    return next_hold_++;
   }
   int lock(int fd) noexcept override {
-    return held_names.insert("descriptor " + std::to_string(fd)).second ? 0 : -EWOULDBLOCK;
+    const std::string name = "descriptor " + std::to_string(fd);
+    if (!held_names.insert(name).second) return -EWOULDBLOCK;
+    holds_[fd] = name;
+    return 0;
+  }
+  void close(int fd) noexcept override {
+    if (const auto held = holds_.extract(fd)) held_names.erase(held.mapped());
+    FakeKernel::close(fd);
   }
   std::int64_t device_number(int fd) noexcept override {
     constexpr std::int64_t kNumber = 0xF800;
-    const bool is_phc = fd == kPhcDescriptor || fd == kOtherPhcDescriptor;
-    return is_phc && device_numbers_known ? kNumber : 0;
+    if (!is_phc(fd) || !device_numbers_known) return 0;
+    return fd == kOtherPhcDescriptor ? kNumber + 1 : kNumber;
   }
   int set_timer(int, std::int64_t ns) noexcept override {
     timer_ns = ns;
@@ -114,8 +126,9 @@ class FakeClocks final : public FakeKernel {
   }
   std::function<void()> on_poll;
   int adjust_clock(clockid_t id, timex& request) noexcept override {
-    Clock& clock = id == CLOCK_REALTIME ? system : phc;
-    if (&clock == &phc && phc_gone) return -ENODEV;
+    const bool other = id == clock_id_of(kOtherPhcDescriptor);
+    Clock& clock = id == CLOCK_REALTIME ? system : other ? other_phc : phc;
+    if (&clock != &system && phc_gone) return -ENODEV;
     if (request.modes != 0) {
       if (adjust_errno != 0) return -adjust_errno;
       if (const int error = change(clock, request); error != 0) return -error;
@@ -128,26 +141,27 @@ class FakeClocks final : public FakeKernel {
     return TIME_OK;
   }
   int control(int fd, unsigned long request, void* argument) noexcept override {
-    if (fd != kPhcDescriptor && fd != kOtherPhcDescriptor)
-      return FakeKernel::control(fd, request, argument);
+    if (!is_phc(fd)) return FakeKernel::control(fd, request, argument);
     if (phc_gone) return -ENODEV;
+    const Clock& clock = fd == kOtherPhcDescriptor ? other_phc : phc;
     switch (request) {
       case PTP_CLOCK_GETCAPS:
         static_cast<ptp_clock_caps*>(argument)->max_adj = static_cast<int>(max_adj_ppb);
         return 0;
       case PTP_SYS_OFFSET_PRECISE:
-        return precise_errno != 0 ? -precise_errno : precise(argument);
+        return precise_errno != 0 ? -precise_errno : precise(clock, argument);
       case PTP_SYS_OFFSET_EXTENDED:
-        return extended_errno != 0 ? -extended_errno : extended(argument);
+        return extended_errno != 0 ? -extended_errno : extended(clock, argument);
       case PTP_SYS_OFFSET:
-        return basic_errno != 0 ? -basic_errno : basic(argument);
+        return basic_errno != 0 ? -basic_errno : basic(clock, argument);
       default:
         return -ENOTTY;
     }
   }
 
-  static constexpr int kPhcDescriptor = 800;       ///< /dev/ptp0, and /dev/ptp_nic, a link to it
-  static constexpr int kOtherPhcDescriptor = 810;  ///< /dev/ptp_node: made for it by mknod
+  static constexpr int kPhcDescriptor = 800;        ///< /dev/ptp0, and /dev/ptp_nic, a link to it
+  static constexpr int kOtherNodeDescriptor = 810;  ///< /dev/ptp_node: made for it by mknod
+  static constexpr int kOtherPhcDescriptor = 820;   ///< /dev/ptp1
   static constexpr int kLockDescriptor = 801;
 
  private:
@@ -158,36 +172,42 @@ class FakeClocks final : public FakeKernel {
     time.nsec = static_cast<std::uint32_t>(now % 1'000'000'000);
     return time;
   }
-  ptp_clock_time read_over_bus() {
+  static bool is_phc(int fd) {
+    return fd == kPhcDescriptor || fd == kOtherNodeDescriptor || fd == kOtherPhcDescriptor;
+  }
+  static clockid_t clock_id_of(int fd) {  // FD_TO_CLOCKID of the kernel
+    return static_cast<clockid_t>((~static_cast<unsigned>(fd) << 3) | 3);
+  }
+  ptp_clock_time read_over_bus(const Clock& clock) {
     run(static_cast<double>(phc_reading_ns) / 2);
-    const ptp_clock_time time = time_of(phc);
+    const ptp_clock_time time = time_of(clock);
     run(static_cast<double>(phc_reading_ns) / 2);
     if (on_clock_read) on_clock_read();
     return time;
   }
-  int precise(void* argument) {
+  int precise(const Clock& clock, void* argument) {
     auto* answer = static_cast<ptp_sys_offset_precise*>(argument);
     if (short_cross_reads) return 0;
-    answer->device = time_of(phc);
+    answer->device = time_of(clock);
     answer->sys_realtime = time_of(system);
     return 0;
   }
-  int extended(void* argument) {
+  int extended(const Clock& clock, void* argument) {
     auto* answer = static_cast<ptp_sys_offset_extended*>(argument);
     if (short_cross_reads) answer->n_samples = 0;
     for (unsigned i = 0; i < answer->n_samples; ++i) {
       answer->ts[i][0] = time_of(system);
-      answer->ts[i][1] = read_over_bus();
+      answer->ts[i][1] = read_over_bus(clock);
       answer->ts[i][2] = time_of(system);
     }
     return 0;
   }
-  int basic(void* argument) {
+  int basic(const Clock& clock, void* argument) {
     auto* answer = static_cast<ptp_sys_offset*>(argument);
     if (short_cross_reads) answer->n_samples = 0;
     for (unsigned i = 0; i < answer->n_samples; ++i) {
       answer->ts[2 * i] = time_of(system);
-      answer->ts[2 * i + 1] = read_over_bus();
+      answer->ts[2 * i + 1] = read_over_bus(clock);
     }
     answer->ts[2 * answer->n_samples] = time_of(system);
     return 0;
@@ -214,6 +234,9 @@ class FakeClocks final : public FakeKernel {
     if ((request.modes & ADJ_ESTERROR) != 0) clock.esterror = request.esterror;
     return 0;
   }
+
+  std::map<int, std::string> holds_;
+  int next_hold_ = 900;
 };
 
 }  // namespace ftcs::platform
