@@ -49,6 +49,16 @@ std::string clock_name(const PtpOptions& options, bool hardware_stamps) {
                      hardware_stamps ? "hardware" : "software", options.skew_ppb);
 }
 
+/// The adaptive servo hears of one direction alone peer to peer: what the link delay moves by, it
+/// follows. The others keep ptp4l's filter.
+PathDelayConfig link_delay_config(const PtpOptions& options) {
+  PathDelayConfig config = options.servo.two_way.path_delay;
+  if (options.servo.kind == ServoKind::kAdaptive && !options.delay_filter_given) {
+    config.filter.kind = DelayFilterKind::kSteadyMean;
+  }
+  return config;
+}
+
 DisciplineConfig discipline_config(const PtpOptions& options, bool hardware_stamps,
                                    const std::optional<LearntState>& learnt) {
   DisciplineConfig config;
@@ -79,7 +89,7 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
       state_(log, driftfile(options, log), options.driftfile_interval,
              clock_name(options, hardware_stamps)),
       discipline_(discipline_config(options, hardware_stamps, state_.learnt()), clock),
-      link_delay_(options.servo.two_way.path_delay) {
+      link_delay_(link_delay_config(options)) {
   if (!state_.learnt()) return;
   // At the known rate from now on, long before the first message: what a driftfile is for.
   if (discipline_.start_at(Rate::from_ratio(1.0 / (1.0 + state_.learnt()->rate_deviation))))
@@ -106,7 +116,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
         "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or allow "
         "one step (--first-step)",
         telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9,
-        options_.clock == ClockKind::kVirtual ? " (--offset)" : "");
+        options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
   }
   const double time_s = (now - start_).seconds();
   const bool used = telemetry.verdict == SampleVerdict::kUsed;
@@ -152,6 +162,16 @@ std::optional<std::string> ClockFollower::on_link_delay(Duration mean_link_delay
                                                         std::optional<Duration> sync_interval) {
   if (!link_delay_.add(mean_link_delay, first) || !waiting_) return std::nullopt;
   return on_pair(*std::exchange(waiting_, std::nullopt), now, sync_interval);
+}
+
+void ClockFollower::on_new_link() {
+  link_delay_.reset();
+  waiting_.reset();
+}
+
+void ClockFollower::on_new_reference() {
+  waiting_.reset();
+  discipline_.on_new_reference();
 }
 
 void ClockFollower::on_silence() {

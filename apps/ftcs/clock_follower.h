@@ -26,15 +26,17 @@ class ClockFollower {
   /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
   [[nodiscard]] std::optional<std::string> on_pair(const EventPair& pair, FreeRunningTime now,
                                                    std::optional<Duration> sync_interval);
-  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, the
-  /// newest pair waits. `first`: of another link. Returns as on_pair() does.
+  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, nothing
+  /// is steered: the newest pair waits. `first`: of another link. Returns as on_pair() does.
   [[nodiscard]] std::optional<std::string> on_link_delay(Duration mean_link_delay, bool first,
                                                          FreeRunningTime now,
                                                          std::optional<Duration> sync_interval);
+  /// Another link: its delay is not known yet.
+  void on_new_link();
   /// Once per turn of the loop.
   void on_silence();
   /// Another reference: what was learnt about the old one is void.
-  void on_new_reference() { discipline_.on_new_reference(); }
+  void on_new_reference();
   /// The clock was put onto another timescale: begins anew, the bound of the first offset included.
   void on_new_timescale() { discipline_.on_new_timescale(); }
   /// At the end: the summary's lines; what was learnt goes to the driftfile.

@@ -91,5 +91,79 @@ TEST_F(Follower, holdover_because_messages_are_refused_says_that_instead) {
       << logged();
 }
 
+class PeerToPeerFollower : public Follower {
+ protected:
+  PeerToPeerFollower() {
+    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+    follower.emplace(options, log, clock, source.now(), false, "test");
+  }
+  void sync(std::int64_t link) {
+    at += kSecond / 8;
+    source.instant = FreeRunningTime::from_ns(at + link);
+    EXPECT_FALSE(
+        follower->on_pair({Direction::kForward, ReferenceTime::from_ns(at), source.instant},
+                          source.now(), std::nullopt));
+  }
+  void link_delay(std::int64_t delay) {
+    EXPECT_FALSE(
+        follower->on_link_delay(Duration::from_whole_ns(delay), false, source.now(), std::nullopt));
+  }
+  [[nodiscard]] std::uint64_t used() const { return follower->discipline().counters().used; }
+  [[nodiscard]] double error_ns() {
+    return (clock.local_at(source.now()).since_epoch() - source.now().since_epoch()).ns();
+  }
+};
+
+TEST_F(PeerToPeerFollower, steers_nothing_and_is_not_locked_before_the_link_delay_is_known) {
+  for (int i = 0; i < 40; ++i) sync(kDelay);
+  EXPECT_EQ(used(), 0U);
+  EXPECT_EQ(follower->discipline().counters().commands, 0U);
+  EXPECT_FALSE(follower->locked());
+  link_delay(kDelay);
+  EXPECT_EQ(used(), 1U) << "the newest";
+  for (int i = 0; i < 40; ++i) sync(kDelay);
+  EXPECT_TRUE(follower->locked());
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+}
+
+TEST_F(PeerToPeerFollower, another_link_has_no_delay_yet) {
+  link_delay(kDelay);
+  for (int i = 0; i < 40; ++i) sync(kDelay);
+  follower->on_new_link();
+  for (int i = 0; i < 3; ++i) sync(5 * kDelay);
+  EXPECT_EQ(used(), 40U);
+  link_delay(5 * kDelay);
+  sync(5 * kDelay);
+  EXPECT_EQ(used(), 42U);
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+}
+
+TEST_F(PeerToPeerFollower,
+       the_adaptive_servo_has_a_steady_link_delay_unless_the_user_chose_a_filter) {
+  const auto link_after_six_late = [this] {
+    follower.emplace(options, log, clock, source.now(), false, "test");
+    for (int i = 0; i < 100; ++i) link_delay(kDelay + (i % 2 == 0 ? 10 : -10));
+    for (int i = 0; i < 6; ++i) link_delay(kDelay + 10);
+    sync(kDelay);
+    return follower->discipline().counters().used > 0
+               ? follower->status(source.now()).last.telemetry.servo.path_delay.ns() - kDelay
+               : 0.0;
+  };
+  options.servo.kind = ServoKind::kAdaptive;
+  EXPECT_NEAR(link_after_six_late(), 0.0, 3.0);
+  options.delay_filter_given = true;
+  EXPECT_NEAR(link_after_six_late(), 10.0, 1e-6) << "the median of ten";
+  options.delay_filter_given = false;
+  options.servo.kind = ServoKind::kFtcs;
+  EXPECT_NEAR(link_after_six_late(), 10.0, 1e-6);
+}
+
+TEST_F(PeerToPeerFollower, what_waits_for_the_link_delay_goes_with_its_reference) {
+  sync(kDelay);
+  follower->on_new_reference();
+  link_delay(kDelay);
+  EXPECT_EQ(used(), 0U);
+}
+
 }  // namespace
 }  // namespace ftcs::app

@@ -51,9 +51,22 @@ TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
   EXPECT_EQ(options.egress_latency, Nanoseconds{12});
   EXPECT_EQ(options.delay_asymmetry, Nanoseconds{-100});
   EXPECT_EQ(options.servo.two_way.path_delay.filter.length, 4U);
+  EXPECT_TRUE(options.delay_filter_given);
   EXPECT_EQ(options.servo.kind, ServoKind::kLinuxptpPi);
   EXPECT_DOUBLE_EQ(options.servo.linuxptp_pi.proportional_const, 0.7);
   EXPECT_EQ(to_text(*options.clock_identity).view(), "001122.fffe.334455");
+}
+
+TEST(ConfigFile, delay_filters_are_ptp4ls_and_one_more) {
+  const auto kind = [](const std::string& name) {
+    const PtpOptions options = options_of(("[global]\ndelay_filter " + name + "\n").c_str());
+    EXPECT_TRUE(options.delay_filter_given);
+    return options.servo.two_way.path_delay.filter.kind;
+  };
+  EXPECT_EQ(kind("moving_median"), DelayFilterKind::kMovingMedian);
+  EXPECT_EQ(kind("moving_minimum"), DelayFilterKind::kMovingMinimum);
+  EXPECT_EQ(kind("steady_mean"), DelayFilterKind::kSteadyMean);
+  EXPECT_FALSE(options_of("[global]\n").delay_filter_given);
 }
 
 TEST(ConfigFile, both_spellings_of_the_roles_are_known) {

@@ -1,14 +1,42 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/suggestion.h"
 
 namespace {
+
+/// The peers' programs, by whose names ours may be looked for.
+std::string command_for(const std::string& name, const std::vector<std::string>& commands) {
+  if (name == "ptp4l") return "ptp";
+  if (name == "phc2sys") return "phc";
+  if (name == "pmc") return "status";
+  return ftcs::app::suggestion(name, commands);
+}
+
+/// What is left of the command line once everything that is known was taken from it.
+std::string unexpected(const CLI::App& app) {
+  const std::vector<std::string> left = app.remaining(true);
+  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
+  const auto option = std::find_if(left.begin(), left.end(), is_option);
+  if (option == left.end()) return fmt::format("unexpected argument '{}'", left.front());
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* known : command->get_options()) {
+      for (const std::string& name : known->get_lnames()) names.push_back("--" + name);
+    }
+  }
+  const std::string name = option->substr(0, option->find('='));
+  return fmt::format("unknown option '{}'{}", name,
+                     ftcs::app::did_you_mean(ftcs::app::suggestion(name, names)));
+}
 
 int run(int argc, char** argv) {
   using namespace ftcs::app;
@@ -26,13 +54,13 @@ int run(int argc, char** argv) {
   add_ptp_command(app, exit_code);
   add_simulate_command(app, exit_code);
   add_status_command(app, exit_code);
-  const auto is_command = [&app](const std::string& name) {
-    return !app.get_subcommands([&](CLI::App* command) { return command->check_name(name); })
-                .empty();
-  };
-  const bool has_command = argc > 1 && is_command(argv[1]);
+  std::vector<std::string> commands;
+  for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
+  const bool has_command =
+      argc > 1 && std::find(commands.begin(), commands.end(), argv[1]) != commands.end();
   if (argc > 1 && argv[1][0] != '-' && !has_command) {
-    fmt::print(stderr, "ftcs: unknown command '{}' (see ftcs --help)\n", argv[1]);
+    fmt::print(stderr, "ftcs: unknown command '{}'{} (see ftcs --help)\n", argv[1],
+               did_you_mean(command_for(argv[1], commands)));
     return kUsageError;
   }
   try {
@@ -41,7 +69,9 @@ int run(int argc, char** argv) {
     return app.exit(request);
   } catch (const CLI::Error& error) {
     const std::string name = has_command ? fmt::format("ftcs {}", argv[1]) : "ftcs";
-    fmt::print(stderr, "{}: {} (see {} --help)\n", name, error.what(), name);
+    const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    fmt::print(stderr, "{}: {} (see {} --help)\n", name, is_extra ? unexpected(app) : error.what(),
+               name);
     return kUsageError;
   }
   return exit_code;

@@ -30,12 +30,18 @@ class ManagementClient {
   void ask(ptp::ManagementId id);
   /// The next answer that can be understood; no value: none has come.
   [[nodiscard]] std::optional<ptp::ManagementData> next_answer();
-  /// Asks, and waits for that one answer: for where nothing runs yet.
+  /// Asks, and waits so long for each answer until it is that one (an earlier question may be
+  /// answered late): for where nothing runs yet.
   template <class Data>
   [[nodiscard]] std::optional<Data> ask_and_wait(ptp::ManagementId id, int patience_ms) {
     ask(id);
-    socket_.wait(patience_ms);
-    while (const auto answer = next_answer()) {
+    for (int i = 0; i < kMostAnswers; ++i) {
+      auto answer = next_answer();
+      if (!answer) {
+        socket_.wait(patience_ms);
+        answer = next_answer();
+      }
+      if (!answer) break;
       if (const auto* data = std::get_if<Data>(&*answer)) return *data;
     }
     return std::nullopt;
@@ -44,6 +50,8 @@ class ManagementClient {
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
 
  private:
+  static constexpr int kMostAnswers = 64;  // a boundary clock answers for each of its ports
+
   ManagementClient(PortAddress address, platform::LocalSocket socket)
       : address_(std::move(address)), socket_(std::move(socket)) {}
 

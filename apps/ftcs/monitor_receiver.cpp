@@ -61,6 +61,7 @@ void MonitorReceiver::wait_until(FreeRunningTime underlying) {
 void MonitorReceiver::housekeeping(FreeRunningTime now) {
   ask_ptp4l(now);
   read_answers(now);
+  follow_scale_change();
   read_reports();
   follower_.on_silence();
   if (real_clock() != nullptr) {
@@ -68,10 +69,15 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
     const auto wrong =
         real_clock()->attend(steering, follower_.locked(), follower_.discipline().latest().servo);
     if (wrong) fail(*wrong);
-    if (real_clock()->take_scale_change()) follower_.on_new_timescale();
+    follow_scale_change();
   }
   watch_for_silence(now);
   log_lock();
+}
+
+// Before the next sample: it would be seconds off, and steered.
+void MonitorReceiver::follow_scale_change() {
+  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_timescale();
 }
 
 // A real clock shows UTC or TAI, chrony UTC; ptp4l's reports do not say which the reference does.
@@ -112,9 +118,8 @@ void MonitorReceiver::on_port_data(const ptp::PortDataSet& port, FreeRunningTime
   const bool receives =
       port.state == ptp::PortState::kTimeReceiver || port.state == ptp::PortState::kUncalibrated;
   if (!receives || port.mean_link_delay <= Duration{}) return;  // none yet
-  const bool first = !std::exchange(link_delay_known_, true);
   const auto wrong =
-      follower_.on_link_delay(port.mean_link_delay, first, now, source_.sync_interval());
+      follower_.on_link_delay(port.mean_link_delay, false, now, source_.sync_interval());
   if (wrong) fail(*wrong);
 }
 
@@ -143,6 +148,8 @@ void MonitorReceiver::on_sample(const ptp::MonitorSample& sample) {
   if (source_.transmitter() != before) {
     log()(LogLevel::kNotice, "ptp4l: samples of the transmitter {}",
           to_text(*source_.transmitter()).view());
+    follower_.on_new_link();
+    next_link_question_ = {};
   }
   if (event->new_reference) {
     log()(LogLevel::kWarning, "ptp4l: another transmitter, or its time jumped; starting anew");

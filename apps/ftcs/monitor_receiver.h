@@ -48,6 +48,7 @@ class MonitorReceiver final : public PtpPort, private Managed {
   void act(const ptp::Action&) override {}
 
   void read_reports();
+  void follow_scale_change();
   void ask_ptp4l(FreeRunningTime now);
   void read_answers(FreeRunningTime now);
   void on_port_data(const ptp::PortDataSet& port, FreeRunningTime now);
@@ -66,7 +67,6 @@ class MonitorReceiver final : public PtpPort, private Managed {
   std::optional<FreeRunningTime> waits_for_scale_since_{};  ///< samples come and cannot be used
   bool scale_known_ = false;
   FreeRunningTime next_link_question_{};
-  bool link_delay_known_ = false;
   bool silent_ = false;          ///< said so
   bool delays_missing_ = false;  ///< said so
   bool was_locked_ = false;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // World: CLOCK_REALTIME of a fake kernel, some seconds and 20 ppm away from TAI; a ptp4l that
 // reports one Sync and one Delay_Req a second, stamped by that clock over 10 us of path, and
-// answers questions. `error()` is the truth.
+// answers questions; peer to peer it reports Syncs alone and tells its link delay. `error()` is the
+// truth.
 #include "apps/ftcs/monitor_receiver.h"
 
 #include <cmath>
@@ -22,7 +23,6 @@ using platform::FakeClocks;
 using platform::LocalSocket;
 
 constexpr double kSecond = 1e9;
-constexpr double kPath = 10e3;
 
 class MonitorReceiverTest : public testing::Test {
  protected:
@@ -68,7 +68,14 @@ class MonitorReceiverTest : public testing::Test {
       if (silent) continue;
       ptp::ManagementMessage message = *ptp::decode_management(datagram->bytes);
       message.body.action = static_cast<std::uint8_t>(ptp::ManagementAction::kResponse);
-      message.data = ptp::TimePropertiesDataSet{utc_offset, 0x0C, 0xA0};
+      if (message.id == ptp::ManagementId::kPortDataSet) {
+        ptp::PortDataSet port;
+        port.state = ptp::PortState::kTimeReceiver;
+        port.mean_link_delay = Duration::from_ns(told_link_delay);
+        message.data = port;
+      } else {
+        message.data = ptp::TimePropertiesDataSet{utc_offset, 0x0C, 0xA0};
+      }
       (void)ptp4l->send(datagram->sender, ptp::encode_management(message).view());
     }
   }
@@ -80,9 +87,11 @@ class MonitorReceiverTest : public testing::Test {
     const auto stamp = [](double ns) { return FakeClocks::kEpoch + std::llround(ns); };
     const std::int64_t local = stamp(kernel.system.time_ns);
     (void)ptp4l->send(options.monitor_socket,
-                      ptp::fake::report(true, sequence, stamp(tai - kPath), local));
-    (void)ptp4l->send(options.monitor_socket,
-                      ptp::fake::report(false, sequence, stamp(tai + kPath), local));
+                      ptp::fake::report(true, sequence, stamp(tai - path), local, transmitter));
+    if (!options.peer_to_peer()) {
+      (void)ptp4l->send(options.monitor_socket,
+                        ptp::fake::report(false, sequence, stamp(tai + path), local, transmitter));
+    }
     ++sequence;
   }
 
@@ -96,6 +105,9 @@ class MonitorReceiverTest : public testing::Test {
   std::uint16_t sequence = 0;
   double next_report_ns = 0.0;
   std::int16_t utc_offset = 37;
+  std::uint8_t transmitter = 0xA;
+  double path = 10e3;
+  double told_link_delay = 0.0;  ///< 0: not measured yet
   bool silent = false;
   int questions = 0;
 };
@@ -165,6 +177,37 @@ TEST_F(MonitorReceiverTest, a_step_by_somebody_else_is_counted_and_followed) {
   EXPECT_TRUE(stepped);
   EXPECT_EQ(foreign_steps, 1U);
   EXPECT_NEAR(error(), 0.0, 200.0);
+}
+
+TEST_F(MonitorReceiverTest, peer_to_peer_nothing_is_steered_before_ptp4l_knows_its_link_delay) {
+  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  kernel.system.time_ns = 1e6;
+  double error_before = 0.0;
+  on_turn = [&] {
+    if (kernel.ideal_ns < 20 * kSecond) {
+      error_before = error();
+    } else {
+      told_link_delay = path;
+    }
+  };
+  EXPECT_EQ(run(), kSuccess);
+  EXPECT_NEAR(error_before, 1e6 + 20e-6 * 20 * kSecond, 20e3);
+  EXPECT_NEAR(error(), 0.0, 100.0);
+}
+
+TEST_F(MonitorReceiverTest, peer_to_peer_another_transmitter_is_at_the_end_of_another_link) {
+  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  told_link_delay = path;
+  double largest = 0.0;
+  on_turn = [&] {
+    if (kernel.ideal_ns > 30 * kSecond) {
+      transmitter = 0xB;
+      told_link_delay = path = 50e3;
+    }
+    if (kernel.ideal_ns > 20 * kSecond) largest = std::max(largest, std::abs(error()));
+  };
+  EXPECT_EQ(run(), kSuccess);
+  EXPECT_LT(largest, 1e3);
 }
 
 }  // namespace

@@ -70,6 +70,10 @@ void set_peer_delay(const ptp::PeerDelay& peer_delay, ptp::ManagedPort& port) {
 }
 
 ptp::ManagedPort receiver(const PtpOptions& options, const PortFacts& facts, ptp::PortState state) {
+  // Nobody (phc2sys, ftcs phc) shall follow the adapter's clock, which runs freely behind a virtual
+  // one. ptp4l's word for that, with free_running, is the same.
+  const bool is_free = options.clock == ClockKind::kVirtual && facts.hardware_stamps;
+  if (is_free && state == ptp::PortState::kTimeReceiver) state = ptp::PortState::kUncalibrated;
   ptp::ManagedPort port = common(options, facts, state);
   port.default_set.flags |= kReceiverOnly;
   port.default_set.quality.clock_class = kReceiverClass;

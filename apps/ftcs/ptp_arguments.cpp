@@ -57,7 +57,8 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
   command.set_help_flag("-h,--help", "print this help and exit");
   command.set_version_flag("-v,--version", "ftcs " FTCS_VERSION, "print the version and exit");
   Flags flags(command);
-  flags.value("-i", arguments.interfaces, "NAME", "network interface, for example eth0");
+  flags.value("-i", arguments.interfaces, "NAME", "network interface, for example eth0")
+      ->allow_extra_args(false);
   flags.value("-f", arguments.config_file, "FILE", "configuration file in ptp4l's format");
   flags.given("-s", arguments.receiver_only, "time receiver only (the default role)");
   flags.setting("-l", "logging_level", arguments, "LEVEL", "log level, 0 to 7; default 6");
@@ -137,6 +138,7 @@ void add_network_flags(CLI::App& command, PtpArguments& arguments) {
   flags
       .value("--acceptable-transmitter", arguments.acceptable, "ID",
              "follow only these clocks, for example 001b21.fffe.a1b2c3; up to 16")
+      ->allow_extra_args(false)
       ->delimiter(',');
   flags.given("--no-fast-start", arguments.no_fast_start,
               "wait for a second Announce before measuring, as IEEE 1588 has it");

@@ -41,6 +41,12 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   ServoConfig& servo = options.servo;
   if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
+  // Debian's ptp4l.conf names it, and its user may never have chosen.
+  if (arguments.steering.servo.empty() && servo.kind == ServoKind::kLinuxptpPi) {
+    options.notes.emplace_back(
+        "clock_servo pi: the servo is linuxptp-pi, with ptp4l's gains and steps; --servo adaptive "
+        "needs no tuning and does not step");
+  }
   if (const auto flag = ftcs_flag(arguments); flag && servo.kind != ServoKind::kFtcs) {
     return fmt::format("{} is of the servo ftcs, this one is {}: add --servo ftcs", *flag,
                        servo_kind_name(servo.kind));

@@ -3,10 +3,14 @@
 
 #include <array>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
 #include <fmt/core.h>
 
+#include "apps/ftcs/suggestion.h"
 #include "apps/ftcs/units.h"
 
 namespace ftcs::app {
@@ -39,7 +43,10 @@ Wrong seconds(std::string_view text, Nanoseconds& target) {
 
 Wrong number(std::string_view text, double& target, double lowest = 0.0) {
   const auto value = parse_number(text, lowest, std::numeric_limits<double>::max());
-  if (!value) return value.error().message;
+  if (!value) {
+    return fmt::format("'{}': expected a plain number, {}", text,
+                       lowest == 0.0 ? "0 or more" : "without a unit");
+  }
   target = *value;
   return std::nullopt;
 }
@@ -64,27 +71,23 @@ Wrong set_identity(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
-/// One of two words.
+/// One of a few words.
 template <class Value>
-struct Choice {
-  std::string_view word;
-  Value value;
-};
-template <class Value>
-Wrong choose(std::string_view text, Value& target, const Choice<Value>& one,
-             const Choice<Value>& other) {
-  for (const Choice<Value>& choice : {one, other}) {
-    if (text != choice.word) continue;
-    target = choice.value;
-    return std::nullopt;
+Wrong choose(std::string_view text, Value& target,
+             std::initializer_list<std::pair<std::string_view, std::type_identity_t<Value>>> all) {
+  std::string words;
+  for (const auto& choice : all) {
+    if (text == choice.first) return target = choice.second, std::nullopt;
+    words.append(words.empty() ? "" : &choice + 1 == all.end() ? " and " : ", ");
+    words.append(choice.first);
   }
-  return fmt::format("'{}' is not supported, only {} and {}", text, one.word, other.word);
+  return fmt::format("'{}' is not supported, only {}", text, words);
 }
 
 Wrong set_delay_mechanism(PtpOptions& options, std::string_view text) {
   using ptp::DelayMechanism;
-  return choose(text, options.delay_mechanism, {"E2E", DelayMechanism::kEndToEnd},
-                {"P2P", DelayMechanism::kPeerToPeer});
+  return choose(text, options.delay_mechanism,
+                {{"E2E", DelayMechanism::kEndToEnd}, {"P2P", DelayMechanism::kPeerToPeer}});
 }
 
 Wrong set_transport(PtpOptions& options, std::string_view text) {
@@ -102,7 +105,7 @@ Wrong mac(std::string_view text, platform::MacAddress& target) {
 }
 
 Wrong set_capable(PtpOptions& options, std::string_view text) {
-  return choose(text, options.always_capable, {"auto", false}, {"true", true});
+  return choose(text, options.always_capable, {{"auto", false}, {"true", true}});
 }
 
 Wrong set_clock_servo(PtpOptions& options, std::string_view text) {
@@ -123,15 +126,17 @@ Wrong set_driftfile(PtpOptions& options, std::string_view text) {
 }
 
 Wrong set_delay_filter(PtpOptions& options, std::string_view text) {
+  options.delay_filter_given = true;
   return choose(text, options.servo.two_way.path_delay.filter.kind,
-                {"moving_median", DelayFilterKind::kMovingMedian},
-                {"moving_minimum", DelayFilterKind::kMovingMinimum});
+                {{"moving_median", DelayFilterKind::kMovingMedian},
+                 {"moving_minimum", DelayFilterKind::kMovingMinimum},
+                 {"steady_mean", DelayFilterKind::kSteadyMean}});
 }
 
 Wrong set_time_stamping(PtpOptions& options, std::string_view text) {
   using platform::TimestampMode;
-  return choose(text, options.timestamps, {"hardware", TimestampMode::kHardware},
-                {"software", TimestampMode::kSoftware});
+  return choose(text, options.timestamps,
+                {{"hardware", TimestampMode::kHardware}, {"software", TimestampMode::kSoftware}});
 }
 
 Wrong set_receiver_only(PtpOptions& options, std::string_view text) {
@@ -263,10 +268,11 @@ constexpr std::array kSettings{
                set_driftfile},
     PtpSetting{"driftfile_interval", "s between two writes; default 3600",
                FTCS_SET(seconds(v, o.driftfile_interval))},
-    PtpSetting{"delay_filter", "moving_median or moving_minimum", set_delay_filter},
+    PtpSetting{"delay_filter", "moving_median, moving_minimum or steady_mean", set_delay_filter},
     PtpSetting{
         "delay_filter_length", "samples, 1 to 32",
-        FTCS_SET(integer(v, o.servo.two_way.path_delay.filter.length, 1, DelayFilter::kCapacity))},
+        FTCS_SET((o.delay_filter_given = true, integer(v, o.servo.two_way.path_delay.filter.length,
+                                                       1, DelayFilter::kCapacity)))},
     PtpSetting{"pi_proportional_const", "ppb per ns; 0: by scale",
                FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_const))},
     PtpSetting{"pi_proportional_scale", "0: by time stamping",
@@ -384,7 +390,9 @@ std::optional<std::string> apply_setting(PtpOptions& options, std::string_view n
     if (std::string_view{fixed.value} == kAny || value == fixed.value) return std::nullopt;
     return fmt::format("{}: '{}' is not supported, only {}", name, value, fixed.value);
   }
-  return fmt::format("unknown setting '{}'", name);
+  std::vector<std::string> names;
+  for (const PtpSetting& setting : kSettings) names.emplace_back(setting.name);
+  return fmt::format("unknown setting '{}'{}", name, did_you_mean(suggestion(name, names)));
 }
 
 }  // namespace ftcs::app

@@ -84,6 +84,7 @@ struct PtpOptions {
   Nanoseconds delay_asymmetry{0};
 
   ServoConfig servo = ptp_servo_defaults();
+  bool delay_filter_given = false;  ///< by the user: the adaptive servo has a default of its own
   SteeringRules steering{};
   ClockKind clock = ClockKind::kVirtual;
   std::string clock_device{};  ///< kPhc: must be the interface's clock; empty: it is

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "apps/ftcs/ptp_receiver.h"
 
+#include <cmath>
 #include <utility>
 #include <variant>
 
@@ -59,6 +60,8 @@ void PtpReceiver::act(const ptp::Action& action) {
                                                    core().sync_interval())) {
       fail(*wrong);
     }
+  } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
+    if (change->to == ptp::PortState::kFaulty) follower_.on_new_link();
   } else if (const auto* seen = std::get_if<ptp::TransmitterSeen>(&action)) {
     log()(LogLevel::kNotice, "port 1 ({}): new foreign master {}", options().interface,
           to_text(seen->port).view());
@@ -84,6 +87,7 @@ void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
 }
 
 void PtpReceiver::on_pair(const EventPair& pair) {
+  follow_scale_change();
   if (const auto wrong = follower_.on_pair(pair, now(), core().sync_interval())) {
     return fail(*wrong);
   }
@@ -92,11 +96,12 @@ void PtpReceiver::on_pair(const EventPair& pair) {
 }
 
 // From the port's state and not from a change of the lock: after a fault shorter than the lock's
-// patience the port comes back uncalibrated while the clock has been locked all along.
+// patience the port comes back uncalibrated while the clock has been locked all along. After a
+// longer one it has not: that is told in every state.
 void PtpReceiver::follow_lock(bool locked) {
   if (locked && core().state() == ptp::PortState::kUncalibrated) {
     perform(core().on_servo_locked(now()));
-  } else if (!locked && core().state() == ptp::PortState::kTimeReceiver) {
+  } else if (!locked) {
     perform(core().on_servo_unlocked(now()));
   }
 }
@@ -109,20 +114,38 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
                                                 discipline.locked(), discipline.latest().servo)) {
       return fail(*wrong);
     }
-    if (real_clock()->take_scale_change()) follower_.on_new_timescale();
+    follow_scale_change();
   }
   if (!follower_.locked()) follow_lock(false);  // only a sample can say that it is locked again
+  // Whoever runs for days must not wait for the end to learn this.
+  constexpr double kPatienceInAnnounces = 5.0;
+  if (!looked_for_missing_ &&
+      seconds_since_start() > kPatienceInAnnounces * std::exp2(options().log_announce_interval)) {
+    looked_for_missing_ = true;
+    if (log_missing(LogLevel::kWarning)) log_unusual(core().counters());
+  }
+}
+
+// Before the next sample: it would be seconds off, and steered.
+void PtpReceiver::follow_scale_change() {
+  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_timescale();
+}
+
+bool PtpReceiver::log_missing(LogLevel level) {
+  if (!had_transmitter_) {
+    log()(level, "no time transmitter was found: domain {}, {}, transportSpecific {}",
+          options().domain, platform::name(options().socket.transport), options().major_sdo_id);
+  }
+  const bool no_peer = options().peer_to_peer() && !core().peer_delay().mean_link_delay();
+  if (no_peer) {
+    log()(level, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
+  }
+  return !had_transmitter_ || no_peer;
 }
 
 int PtpReceiver::finish() {
   follower_.log_summary();
-  if (!had_transmitter_) {
-    log()(LogLevel::kNotice, "no time transmitter was found: domain {}, {}, transportSpecific {}",
-          options().domain, platform::name(options().socket.transport), options().major_sdo_id);
-  }
-  if (options().peer_to_peer() && !core().peer_delay().mean_link_delay()) {
-    log()(LogLevel::kNotice, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
-  }
+  (void)log_missing(LogLevel::kNotice);
   log_peer_delay(core().peer_delay());
   log_unusual(core().counters());
   return follower_.locked() ? kSuccess : kNotLocked;

@@ -27,10 +27,14 @@ class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver>, private Managed
 
   void on_pair(const EventPair& pair);
   void on_selected(const ptp::TransmitterSelected& selected);
+  void follow_scale_change();
   void follow_lock(bool locked);
+  /// True if there was something to say.
+  bool log_missing(LogLevel level);
 
   ClockFollower follower_;
   bool had_transmitter_ = false;
+  bool looked_for_missing_ = false;
   PortFacts facts_;
 };
 

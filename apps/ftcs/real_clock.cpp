@@ -38,6 +38,7 @@ RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock c
     : kernel_(kernel), log_(log), clock_(std::move(clock)), timer_(kernel), utc_(std::move(utc)) {}
 
 void RealClock::before_wait(std::optional<std::int64_t> at_most_ns) {
+  (void)clock_.read();  // what is left of a correction counts from now
   std::optional<std::int64_t> wait = clock_.wait_for_expiry_ns();
   if (at_most_ns) wait = std::min(wait.value_or(*at_most_ns), *at_most_ns);
   if (wait) timer_.set(*wait);

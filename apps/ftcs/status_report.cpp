@@ -172,7 +172,8 @@ void add_follower(Json& status, const ClockFollower& follower, FreeRunningTime n
   status["last_sample_age_s"] = if_known(known.has_sample, known.last_age_s);
   status["offset_ns"] = if_known(has_offset, known.last.offset.ns());
   status["offset_sigma_ns"] = number(t.servo.offset_sigma_ns);
-  status["path_delay_ns"] = if_known(has_offset, t.servo.path_delay.ns());
+  // Of the sample: peer to peer, the servo knows none.
+  status["path_delay_ns"] = if_known(has_offset, known.last.telemetry.servo.path_delay.ns());
   status["path_delay_sigma_ns"] = number(t.servo.path_delay_sigma_ns);
   status["applied_rate_ppb"] = number(t.applied_rate.ppb());
   status["tracking_rate_ppb"] = number(t.tracking_rate.ppb());

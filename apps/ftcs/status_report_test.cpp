@@ -76,5 +76,32 @@ TEST(StatusReport, ATimeReceiverThatHearsNobodyKnowsNoOffset) {
   EXPECT_EQ(sets.time_status.grandmaster_present, 0);
 }
 
+TEST(StatusReport, PeerToPeerThePathDelayIsThatOfTheLink) {
+  PtpOptions options;
+  options.interface = "eth0";
+  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  platform::LinuxKernel kernel;
+  Log log(kernel, stdout, 0);
+  test::ManualSource source;
+  VirtualClock clock(source, {});
+  ClockFollower follower(options, log, clock, source.now(), false, "port 1 (eth0)");
+  const Duration link = Duration::from_whole_ns(1500);
+  EXPECT_FALSE(follower.on_link_delay(link, true, source.now(), std::nullopt));
+  for (int i = 1; i < 10; ++i) {
+    const std::int64_t sent = i * std::int64_t{125'000'000};
+    source.instant = FreeRunningTime::from_ns(sent) + link;
+    EXPECT_FALSE(
+        follower.on_pair({Direction::kForward, ReferenceTime::from_ns(sent), source.instant},
+                         source.now(), std::nullopt));
+    follower.on_silence();
+  }
+  const ptp::MonitorSource reports;
+  const PortFacts facts{};
+  const ptp::ManagementCounters management{};
+  const auto json = monitor_status({options, facts, 1.0, management}, reports,
+                                   ptp::PortState::kTimeReceiver, follower, source.now());
+  EXPECT_NE(json.find("\"path_delay_ns\": 1500.0"), std::string::npos) << json;
+}
+
 }  // namespace
 }  // namespace ftcs::app

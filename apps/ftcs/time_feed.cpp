@@ -30,6 +30,12 @@ ReferenceScale reference_scale(std::uint16_t flags, int utc_offset) {
 
 Result<TimeFeed, std::string> TimeFeed::open(const PtpOptions& options) {
   TimeFeed feed(options.utc_offset);
+  const bool wanted = !options.chrony_socket.empty() || options.ntp_shm_unit;
+  if (wanted && !options.leap_file.empty()) {
+    auto list = LeapSeconds::read_file(options.leap_file);
+    if (!list) return list.error();
+    feed.leap_seconds_ = std::move(*list);
+  }
   if (!options.chrony_socket.empty()) {
     auto socket = platform::ChronySocket::open(options.chrony_socket);
     if (!socket) return "--chrony-sock: " + socket.error().message();
@@ -43,16 +49,26 @@ Result<TimeFeed, std::string> TimeFeed::open(const PtpOptions& options) {
   return feed;
 }
 
+LeapSeconds::State TimeFeed::utc_at(std::int64_t local_s) const {
+  LeapSeconds::State utc{scale_.tai ? scale_.utc_offset.value_or(utc_offset_) : 0, scale_.leap};
+  if (!scale_.tai || !leap_seconds_) return utc;
+  const auto listed = leap_seconds_->at(local_s - utc.utc_offset);
+  if (!listed) return utc;
+  if (!scale_.utc_offset) utc.utc_offset = listed->utc_offset;
+  if (utc.leap == 0) utc.leap = listed->leap;
+  return utc;
+}
+
 void TimeFeed::publish(const ClockFollower& follower, LocalTime local, std::int64_t realtime_ns,
                        Log& log) {
   const std::uint64_t used = follower.discipline().counters().used;
   if (!follower.locked() || used == std::exchange(told_, used)) return;
-  const int utc_offset = scale_.tai ? scale_.utc_offset.value_or(utc_offset_) : 0;
+  const LeapSeconds::State utc = utc_at(local.since_epoch().rounded_ns() / 1'000'000'000);
   platform::NtpSample sample;
   sample.system_ns = realtime_ns;
   sample.behind = local.since_epoch() - Duration::from_whole_ns(realtime_ns) -
-                  Duration{std::chrono::seconds{utc_offset}};
-  sample.leap = scale_.leap;
+                  Duration{std::chrono::seconds{utc.utc_offset}};
+  sample.leap = utc.leap;
   sample.sigma_s = sigma_s(follower);
   if (shm_) shm_->write(sample);
   if (!socket_) return;

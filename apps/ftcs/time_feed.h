@@ -5,6 +5,7 @@
 #include <string>
 
 #include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/leap_seconds.h"
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
 #include "apps/ftcs/real_clock.h"
@@ -29,8 +30,11 @@ class TimeFeed {
 
  private:
   explicit TimeFeed(int utc_offset) : utc_offset_(utc_offset) {}
+  /// By what the reference vouches for, else by the list, else by `utc_offset_`.
+  [[nodiscard]] LeapSeconds::State utc_at(std::int64_t local_s) const;
 
-  int utc_offset_;  ///< where the reference vouches for none
+  int utc_offset_;
+  std::optional<LeapSeconds> leap_seconds_{};
   std::optional<platform::ChronySocket> socket_{};
   std::optional<platform::NtpShm> shm_{};
   ReferenceScale scale_{false};

@@ -5,6 +5,8 @@
 #include "apps/ftcs/time_feed.h"
 
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -108,6 +110,33 @@ TEST_F(Feed, TaiIsBroughtToUtc) {
   feed->set_scale(reference_scale(kTai, 40));  // not vouched for: utc_offset of the options
   publish(*feed, -37 * kSecond);
   EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
+}
+
+TEST_F(Feed, TheLeapSecondListTellsWhatTheReferenceDoesNot) {
+  const std::string path = reader.path() + ".list";
+  constexpr std::int64_t kMidnight = 1'795'305'600 + 2'208'988'800;  // of that day, since 1900
+  std::ofstream(path) << 2'272'060'800 << " 33\n" << kMidnight << " 34\n";
+  options.leap_file = path;
+  auto feed = TimeFeed::open(options);
+  ASSERT_TRUE(feed.ok()) << feed.error();
+  lock();
+  constexpr std::uint16_t kTai = ptp::flag::kPtpTimescale;
+  feed->set_scale(reference_scale(kTai, 0));
+  publish(*feed, -33 * kSecond);
+  const auto sample = read();
+  EXPECT_NEAR(sample->offset_s, 0.0, 1e-9);
+  EXPECT_EQ(sample->leap, 1);
+  exchange();
+  feed->set_scale(reference_scale(kTai | ptp::flag::kUtcOffsetValid, 40));  // knows better
+  publish(*feed, -40 * kSecond);
+  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
+  exchange();
+  feed->set_scale(reference_scale(0, 0));  // UTC already
+  publish(*feed, 0);
+  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
+  std::filesystem::remove(path);
+  options.leap_file = path;
+  EXPECT_FALSE(TimeFeed::open(options).ok());
 }
 
 TEST_F(Feed, LeapSecondsAreHandedOn) {

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/config_file.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/phc/phc_options.h"
 #include "apps/ftcs/phc/phc_runner.h"
@@ -43,8 +44,36 @@ void refuse(CLI::App& command, const char* flag, const char* reason, bool takes_
   }
 }
 
+/// What phc2sys reads of ptp4l's configuration file.
+void read_file(const std::string& path, PhcArguments& arguments) {
+  PtpOptions file;
+  if (const auto wrong = read_config_file(path, file)) throw CLI::ValidationError("-f", *wrong);
+  PhcOptions& options = arguments.options;
+  options.port.domain = file.domain;
+  options.port.major_sdo_id = file.major_sdo_id;
+  if (file.uds_address_given) options.port.socket = file.uds_address;
+  options.first_step_threshold = file.first_step_threshold;
+  options.step_threshold = file.step_threshold;
+  options.log_level = file.log_level;
+  arguments.leap_by_us = !file.kernel_leap;
+  options.steering = file.steering;
+  options.servo.kind = file.servo.kind;
+  options.servo.limits = file.servo.limits;
+  options.servo.adaptive.steering = file.servo.adaptive.steering;
+  const auto& pi = file.servo.linuxptp_pi;
+  auto& ours = options.servo.linuxptp_pi;
+  if (pi.proportional_const > 0.0) ours.proportional_const = pi.proportional_const;
+  if (pi.integral_const > 0.0) ours.integral_const = pi.integral_const;
+}
+
 void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
   PhcOptions& options = arguments.options;
+  // Before all others, which are read in this order: they win.
+  command
+      .add_option_function<std::string>(
+          "-f", [&arguments](const std::string& path) { read_file(path, arguments); },
+          "configuration file in ptp4l's format")
+      ->type_name("FILE");
   command.add_option("-s", options.source, "source: /dev/ptpN, an interface or CLOCK_REALTIME")
       ->type_name("CLOCK");
   command.add_option("-c", options.sink, "what is steered, named likewise; default CLOCK_REALTIME")
@@ -62,14 +91,15 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
   command.add_flag("-a", options.automatic,
                    "follow the state of a PTP port of this machine; with -r");
   command.add_flag("-r", arguments.system_clock,
-                   "-a: the system clock follows the port's clock while that receives time");
+                   "-a: the system clock follows the port's clock while that receives time; twice: "
+                   "and leads it while that transmits");
   command.add_flag("-w", options.wait_for_port,
                    "wait until the PTP port is synchronised, and take UTC from it");
   command
-      .add_option("-z", options.port.socket,
+      .add_option("-z,--uds_address", options.port.socket,
                   "-a, -w: management socket of ptp4l or ftcs ptp; default /var/run/ptp4l")
       ->type_name("PATH");
-  command.add_option("-n", options.port.domain, "-a, -w: PTP domain; default 0")
+  command.add_option("-n,--domainNumber", options.port.domain, "-a, -w: PTP domain; default 0")
       ->type_name("DOMAIN")
       ->check(integer_from(0, 255));
   command
@@ -82,19 +112,26 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
 
 void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
   add_steering_flags(command, arguments.steering);
-  command.add_option("-E", arguments.law, "pi: as --servo linuxptp-pi")->type_name("NAME");
-  command.add_option("-P", arguments.proportional, "pi: proportional constant; default 0.7")
+  command.add_option("-E,--clock_servo", arguments.law, "pi: as --servo linuxptp-pi")
+      ->type_name("NAME");
+  command
+      .add_option("-P,--pi_proportional_const", arguments.proportional,
+                  "pi: proportional constant; default 0.7")
       ->type_name("KP")
       ->check(number_from(0.0, 1e6));
-  command.add_option("-I", arguments.integral, "pi: integral constant; default 0.3")
+  command
+      .add_option("-I,--pi_integral_const", arguments.integral,
+                  "pi: integral constant; default 0.3")
       ->type_name("KI")
       ->check(number_from(0.0, 1e6));
   command
-      .add_option("-F", arguments.first_step_s,
+      .add_option("-F,--first_step_threshold", arguments.first_step_s,
                   "step at the start above this; default 0.00002, 0: never")
       ->type_name("SECONDS")
       ->check(number_from(0.0, 1e9));
-  command.add_option("-S", arguments.step_s, "step at any time above this; default 0: never")
+  command
+      .add_option("-S,--step_threshold", arguments.step_s,
+                  "step at any time above this; default 0: never")
       ->type_name("SECONDS")
       ->check(number_from(0.0, 1e9));
 }
@@ -113,7 +150,7 @@ void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
                   "comparisons in a summary line; default 0: each")
       ->type_name("N")
       ->check(integer_from(0, 1'000'000));
-  command.add_option("-l", options.log_level, "log level, 0 to 7; default 6")
+  command.add_option("-l,--logging_level", options.log_level, "log level, 0 to 7; default 6")
       ->type_name("LEVEL")
       ->check(integer_from(0, 7));
   command.add_option("--duration", arguments.duration_s, "stop after so many seconds")
@@ -125,7 +162,7 @@ void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
       "-q", [] {}, "accepted: messages never go to the system log");
   command
       .add_option_function<std::string>(
-          "-L", [](const std::string&) {},
+          "-L,--sanity_freq_limit", [](const std::string&) {},
           "accepted: the clock is always watched for others' steering")
       ->type_name("PPB")
       ->check(number_from(0.0, 1e9));
@@ -133,7 +170,6 @@ void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
 
 void refuse_the_rest(CLI::App& command) {
   refuse(command, "-d", "a PPS source is not supported", true);
-  refuse(command, "-f", "a configuration file is not supported", true);
   refuse(command, "-t", "a message tag is not supported", true);
   refuse(command, "-M", "an NTP SHM segment is not supported", true);
 }
@@ -185,8 +221,8 @@ Wrong apply_offset(PhcOptions& options) {
   if (!from_system && !to_system) {
     options.sink_ahead_s = 0;  // two hardware clocks keep the same timescale
   } else if (options.leap_file.empty()) {
-    return "the time offset must be given: -O SECONDS (steered clock minus source) or --leapfile "
-           "FILE";
+    return "the time offset must be given: -O SECONDS (steered clock minus source), --leapfile "
+           "FILE, or -w to take it from ptp4l or ftcs ptp";
   } else if (!to_system) {
     return "--leapfile: only where CLOCK_REALTIME is steered; give -O";
   }
@@ -199,7 +235,6 @@ Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) 
     return arguments.system_clock > 0 ? Wrong("-r is of -a") : std::nullopt;
   }
   if (arguments.system_clock == 0) return "-a needs -r: the system clock is what can follow";
-  if (arguments.system_clock > 1) return "-r -r: the system clock as a source is not supported";
   if (options.wait_for_port) return "-a and -w exclude each other";
   if (options.sink_ahead_s) return "-a and -O exclude each other";
   if (!options.source.empty() || options.sink != "CLOCK_REALTIME") {
@@ -212,6 +247,7 @@ Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
   if (auto wrong = check_automatic(arguments, options)) return wrong;
   if (options.source.empty() && !options.automatic)
     return "no source: give one with -s, for example -s eth0";
+  options.system_may_lead = arguments.system_clock > 1;
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
   options.kernel_leap = !arguments.leap_by_us;
   if (auto wrong = apply_offset(options)) return wrong;

@@ -29,8 +29,9 @@ struct PhcOptions {
   std::optional<int> sink_ahead_s{};    ///< -O: sink - source; none: by the leap second list
   std::string leap_file{};
   bool kernel_leap = true;
-  bool automatic = false;      ///< -a -r: source is the clock of the PTP port that receives time
-  bool wait_for_port = false;  ///< -w: until the PTP port is synchronised; its UTC offset holds
+  bool automatic = false;        ///< -a -r: source is the clock of the PTP port that receives time
+  bool system_may_lead = false;  ///< -a -r -r: and the one that transmits follows the system clock
+  bool wait_for_port = false;    ///< -w: until the PTP port is synchronised; its UTC offset holds
   PortAddress port{};
   int readings = 5;
   double rate_hz = 1.0;

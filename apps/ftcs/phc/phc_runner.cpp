@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -94,10 +95,14 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
   sink_->set_reference_scale(scale);
 }
 
-void PhcRunner::follow_port(PortWatch watch, bool receiving) {
+void PhcRunner::follow_port(PortWatch watch, const std::optional<Pairing>& pairing) {
   watch_.emplace(std::move(watch));
-  needs_receiver_ = receiving;
+  pairing_ = pairing;
   following_ = false;
+}
+
+std::optional<PortWatch> PhcRunner::take_moved_port() {
+  return port_moved_ ? std::exchange(watch_, std::nullopt) : std::nullopt;
 }
 
 // A hardware clock that follows the system clock is to show TAI; the other way round RealClock
@@ -115,25 +120,37 @@ void PhcRunner::set_scale(const ReferenceScale& scale) {
   discipline_.on_new_timescale();
 }
 
+// Before the next sample: it would be seconds off, and steered.
+void PhcRunner::follow_scale_change() {
+  if (sink_->take_scale_change()) discipline_.on_new_timescale();
+}
+
 bool PhcRunner::may_follow() {
   if (!watch_) return true;
   watch_->attend(kernel_.clock_ns(CLOCK_MONOTONIC_RAW));
-  const bool may = needs_receiver_ ? watch_->is_receiving() : watch_->is_synchronised();
+  bool may = watch_->is_synchronised();
+  if (pairing_) {
+    const auto wanted = pairing(*watch_, options_.system_may_lead);
+    may = wanted == pairing_;
+    port_moved_ = wanted && !may;
+  }
   if (may) set_scale(watch_->port()->scale);
   if (may == following_) return may;
   following_ = may;
   const std::string_view state =
       watch_->port() ? to_string(watch_->port()->state) : std::string_view{"silent"};
   log_(LogLevel::kNotice, "the PTP port is {}: {}", state,
-       may ? "following" : "keeping the last rate");
+       may           ? "following"
+       : port_moved_ ? "another clock is to follow now"
+                     : "keeping the last rate");
   if (may && discipline_.counters().commands > 0) discipline_.on_new_reference();
   return may;
 }
 
 int PhcRunner::run() {
-  log_(LogLevel::kInfo, "{} {} {} (compared by {})", sink_->name(),
-       options_.free_running ? "is compared with" : "follows", source_.name(),
-       comparison_.method());
+  log_(LogLevel::kInfo, "{} {} {} (compared by {}; servo {})", sink_->name(),
+       options_.free_running ? "is compared with" : "follows", source_.name(), comparison_.method(),
+       servo_kind_name(options_.servo.kind));
   const platform::StopFlag stop;
   const std::int64_t start = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
   next_raw_ns_ = start;
@@ -141,9 +158,10 @@ int PhcRunner::run() {
     return options_.duration &&
            kernel_.clock_ns(CLOCK_MONOTONIC_RAW) - start >= options_.duration->floor_ns();
   };
-  while (!stop.is_set() && !failure_ && !is_over()) {
+  while (!stop.is_set() && !failure_ && !port_moved_ && !is_over()) {
     wait();
     const bool may = may_follow();
+    follow_scale_change();
     if (kernel_.clock_ns(CLOCK_MONOTONIC_RAW) >= next_raw_ns_) {
       schedule_next();
       if (may) {
@@ -155,7 +173,7 @@ int PhcRunner::run() {
     const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
                                      discipline_.latest().servo);
     if (wrong) fail(*wrong);
-    if (sink_->take_scale_change()) discipline_.on_new_timescale();
+    follow_scale_change();
   }
   sink_->stop();
   if (failure_) {
@@ -259,24 +277,67 @@ int PhcRunner::finish() {
 
 namespace {
 
-/// -a: until the port says on which interface it receives time. False: stopped before.
-bool wait_for_receiver(platform::Kernel& kernel, const PhcOptions& options, PortWatch& watch) {
+/// -a: until the port's state says which clock follows which. No value: stopped before.
+std::optional<Pairing> wait_for_pairing(platform::Kernel& kernel, const PhcOptions& options,
+                                        Log& log, PortWatch& watch) {
   constexpr int kTurnMs = 50;
   const platform::StopFlag stop;
   const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
-  for (std::int64_t now = start; !watch.is_receiving();
-       now = kernel.clock_ns(CLOCK_MONOTONIC_RAW)) {
-    if (stop.is_set()) return false;
-    if (options.duration && now - start >= options.duration->floor_ns()) return false;
+  std::optional<ptp::PortState> said;
+  for (std::int64_t now = start;; now = kernel.clock_ns(CLOCK_MONOTONIC_RAW)) {
+    if (auto wanted = pairing(watch, options.system_may_lead)) return wanted;
+    if (watch.port() && watch.port()->state != said) {
+      said = watch.port()->state;
+      log(LogLevel::kNotice, "the PTP port is {}: waiting", to_string(*said));
+    }
+    if (stop.is_set()) return std::nullopt;
+    if (options.duration && now - start >= options.duration->floor_ns()) return std::nullopt;
     watch.attend(now);
     (void)kernel.poll({}, kTurnMs);
   }
-  return true;
+}
+
+/// -a: one run after another, each with the clocks that the port then asks for.
+int run_automatic(platform::Kernel& kernel, PhcOptions options, Log& log, PortWatch watch) {
+  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
+  const auto duration = options.duration;
+  const auto first_step = options.first_step_threshold;
+  std::set<std::string> steered;
+  for (;;) {
+    if (duration) {
+      const std::int64_t gone = kernel.clock_ns(CLOCK_MONOTONIC_RAW) - start;
+      options.duration = *duration - Duration::from_whole_ns(gone);
+    }
+    const auto wanted = wait_for_pairing(kernel, options, log, watch);
+    if (!wanted) return kNotLocked;
+    if (!watch.port()->hardware_timestamps) {
+      log(LogLevel::kError,
+          "the PTP port on {} takes software timestamps: its clock is the system clock already",
+          wanted->interface);
+      return kRuntimeError;
+    }
+    const std::string system = "CLOCK_REALTIME";
+    options.source = wanted->port_leads ? wanted->interface : system;
+    options.sink = wanted->port_leads ? system : wanted->interface;
+    // A clock that was near its source is not to jump because it has another one now.
+    options.first_step_threshold = steered.contains(options.sink) ? Nanoseconds{0} : first_step;
+    auto runner = PhcRunner::open(kernel, options, log);
+    if (!runner) {
+      log(LogLevel::kError, "{}", runner.error());
+      return kRuntimeError;
+    }
+    (*runner)->follow_port(std::move(watch), wanted);
+    const int code = (*runner)->run();
+    auto moved = (*runner)->take_moved_port();
+    if (!moved || code == kRuntimeError) return code;
+    if ((*runner)->has_steered()) steered.insert(options.sink);
+    watch = std::move(*moved);
+  }
 }
 
 }  // namespace
 
-int run_phc(platform::Kernel& kernel, PhcOptions options, Log& log) {
+int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log) {
   const auto refuse = [&log](const std::string& reason) {
     log(LogLevel::kError, "{}", reason);
     return kRuntimeError;
@@ -286,19 +347,16 @@ int run_phc(platform::Kernel& kernel, PhcOptions options, Log& log) {
     auto opened = PortWatch::open(options.port);
     if (!opened) return refuse(opened.error().message());
     watch.emplace(std::move(*opened));
-    log(LogLevel::kNotice, "waiting for a PTP port at {}", options.port.socket);
+    const PortAddress& port = options.port;
+    log(LogLevel::kNotice,
+        "waiting for the PTP port at {}, domain {}, transportSpecific {} (-z, -n and "
+        "--transportSpecific name another)",
+        port.socket, port.domain, port.major_sdo_id);
   }
-  if (options.automatic) {
-    if (!wait_for_receiver(kernel, options, *watch)) return kNotLocked;
-    if (!watch->port()->hardware_timestamps) {
-      return refuse("the PTP port on " + watch->port()->interface +
-                    " takes software timestamps: its clock is the system clock already");
-    }
-    options.source = watch->port()->interface;
-  }
+  if (options.automatic) return run_automatic(kernel, options, log, std::move(*watch));
   auto runner = PhcRunner::open(kernel, options, log);
   if (!runner) return refuse(runner.error());
-  if (watch) (*runner)->follow_port(std::move(*watch), options.automatic);
+  if (watch) (*runner)->follow_port(std::move(*watch), std::nullopt);
   return (*runner)->run();
 }
 

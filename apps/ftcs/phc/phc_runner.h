@@ -31,11 +31,14 @@ class PhcRunner {
   [[nodiscard]] static Result<std::unique_ptr<PhcRunner>, std::string> open(
       platform::Kernel& kernel, const PhcOptions& options, Log& log);
 
-  /// From now on it steers only while that PTP port is synchronised (`receiving`: as a receiver),
-  /// and takes UTC from it. Before run().
-  void follow_port(PortWatch watch, bool receiving);
+  /// From now on it steers only while that PTP port is synchronised (`pairing`: while that is what
+  /// it asks for, and the run ends when it asks for another), and takes UTC from it. Before run().
+  void follow_port(PortWatch watch, const std::optional<Pairing>& pairing);
   /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
   [[nodiscard]] int run();
+  /// After a run that ended because the port asks for another pairing; otherwise no value.
+  [[nodiscard]] std::optional<PortWatch> take_moved_port();
+  [[nodiscard]] bool has_steered() const { return discipline_.counters().commands > 0; }
 
  private:
   struct Clocks {
@@ -46,6 +49,7 @@ class PhcRunner {
   PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
 
   void wait();
+  void follow_scale_change();
   [[nodiscard]] bool may_follow();
   void set_scale(const ReferenceScale& scale);
   void schedule_next();
@@ -63,7 +67,8 @@ class PhcRunner {
   ClockComparison comparison_;
   ClockDiscipline discipline_;
   std::optional<PortWatch> watch_;
-  bool needs_receiver_ = false;
+  std::optional<Pairing> pairing_;
+  bool port_moved_ = false;
   bool following_ = true;
   SampleSummary recent_;
   SampleSummary since_lock_;
@@ -74,6 +79,6 @@ class PhcRunner {
 };
 
 /// Everything that `ftcs phc` does once its options are known to be consistent.
-[[nodiscard]] int run_phc(platform::Kernel& kernel, PhcOptions options, Log& log);
+[[nodiscard]] int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log);
 
 }  // namespace ftcs::app

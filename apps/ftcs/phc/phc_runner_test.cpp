@@ -65,6 +65,20 @@ TEST(PhcRunner, brings_a_hardware_clock_to_the_system_clock) {
   EXPECT_NEAR(world.kernel.system.steering(), 1.0, 1e-15);
 }
 
+TEST(PhcRunner, brings_one_hardware_clock_to_another) {
+  for (const bool precise : {true, false}) {
+    World world;
+    world.kernel.precise_errno = precise ? 0 : EOPNOTSUPP;
+    world.kernel.other_phc.time_ns = -3e6;
+    world.kernel.other_phc.oscillator = 1.0 + 70e-6;
+    world.options.sink = "/dev/ptp1";
+    EXPECT_EQ(world.run(30.0), kSuccess);
+    EXPECT_NEAR(world.kernel.other_phc.time_ns - world.kernel.phc.time_ns, 0.0, 50.0);
+    EXPECT_NEAR(world.kernel.phc.steering(), 1.0, 1e-15) << "the source is not touched";
+    EXPECT_NEAR(world.kernel.system.steering(), 1.0, 1e-15) << "nor what they are compared by";
+  }
+}
+
 TEST(PhcRunner, keeps_a_constant_difference) {
   World world;
   world.options.sink_ahead_s = -37;
@@ -81,6 +95,31 @@ TEST(PhcRunner, never_steps_if_told_so_and_is_there_within_two_readings) {
     last = world.kernel.system.time_ns;
   };
   EXPECT_LT(world.largest_difference(20.0, 3.0), 200.0);
+}
+
+TEST(PhcRunner, steps_at_any_time_above_a_threshold_if_it_is_given_one) {
+  for (const bool may_step : {false, true}) {
+    World world;
+    if (may_step) world.options.step_threshold = Nanoseconds{1'000'000};
+    bool jumped = false;
+    double farthest_late = 0.0;  // ten readings after the source jumped by 50 ms
+    double last = 0.0;
+    double largest_move = 0.0;  // in a quarter of a second at most: a slew makes 7.5 ms
+    world.kernel.on_poll = [&] {
+      if (!jumped && world.kernel.ideal_ns > 10e9) world.kernel.phc.time_ns += 50e6;
+      jumped = jumped || world.kernel.ideal_ns > 10e9;
+      if (world.kernel.ideal_ns > 20e9) {
+        farthest_late = std::max(farthest_late, std::abs(world.difference()));
+      }
+      const double ahead = world.kernel.system.time_ns - world.kernel.raw;
+      if (world.kernel.ideal_ns > 5e9)
+        largest_move = std::max(largest_move, std::abs(ahead - last));
+      last = ahead;
+    };
+    EXPECT_EQ(world.run(40.0), kSuccess) << may_step;
+    EXPECT_LT(farthest_late, 100.0) << may_step;
+    EXPECT_EQ(largest_move > 10e6, may_step) << largest_move;
+  }
 }
 
 TEST(PhcRunner, changes_the_rate_by_no_more_at_a_time_than_it_may) {
@@ -173,6 +212,39 @@ TEST(PhcRunner, a_right_that_is_taken_away_ends_the_run) {
     world.kernel.adjust_errno = world.kernel.ideal_ns > 5e9 ? EPERM : 0;
   };
   EXPECT_EQ(world.run(20.0), kRuntimeError);
+}
+
+TEST(PhcRunner, a_clock_that_is_busy_for_a_while_is_steered_again_and_said_once) {
+  World world;
+  Log log{world.kernel, stdout, 4};
+  world.options.duration = Duration::from_ns(30e9);
+  world.kernel.on_poll = [&] {
+    const double s = world.kernel.ideal_ns / 1e9;
+    world.kernel.adjust_errno = s > 10.0 && s < 15.0 ? EBUSY : 0;
+  };
+  auto runner = PhcRunner::open(world.kernel, world.options, log);
+  ASSERT_TRUE(runner.ok());
+  testing::internal::CaptureStdout();
+  EXPECT_EQ((*runner)->run(), kSuccess);
+  const std::string said = testing::internal::GetCapturedStdout();
+  const auto first = said.find("refuses to steer it now");
+  EXPECT_NE(first, std::string::npos) << said;
+  EXPECT_EQ(said.find("refuses to steer", first + 10), std::string::npos) << said;
+  EXPECT_NEAR(world.difference(), 0.0, 50.0);
+}
+
+TEST(PhcRunner, says_which_clocks_how_and_by_what_servo) {
+  World world;
+  Log log{world.kernel, stdout, 6};
+  world.options.servo.kind = ServoKind::kLinuxptpPi;
+  world.options.duration = Duration::from_ns(1e9);
+  auto runner = PhcRunner::open(world.kernel, world.options, log);
+  ASSERT_TRUE(runner.ok());
+  testing::internal::CaptureStdout();
+  (void)(*runner)->run();
+  EXPECT_NE(testing::internal::GetCapturedStdout().find(
+                "CLOCK_REALTIME follows /dev/ptp0 (compared by extended; servo linuxptp-pi)"),
+            std::string::npos);
 }
 
 TEST(PhcRunner, says_what_cannot_be_opened_and_touches_nothing) {

@@ -13,6 +13,11 @@ constexpr std::int64_t kQuestionIntervalNs = 1'000'000'000;
 constexpr std::int64_t kPatienceNs = 5'000'000'000;
 constexpr int kAnswersAtOnce = 16;
 
+int importance(ptp::PortState state) {
+  if (state == ptp::PortState::kTimeReceiver) return 2;
+  return state == ptp::PortState::kTimeTransmitter ? 1 : 0;
+}
+
 }  // namespace
 
 Result<PortWatch, platform::OsError> PortWatch::open(const PortAddress& address) {
@@ -39,13 +44,13 @@ void PortWatch::attend(std::int64_t now_ns) {
 }
 
 // A boundary clock answers for each of its ports: the one that receives time is the one that
-// counts.
+// counts, and for want of that one that transmits.
 void PortWatch::take(const ptp::ManagementData& data, std::int64_t now_ns) {
   if (const auto* properties = std::get_if<ptp::PortPropertiesNp>(&data)) {
     const bool other = properties_ && properties_->port != properties->port;
-    const bool receives = properties->state == ptp::PortState::kTimeReceiver;
-    const bool held = properties_ && properties_->state == ptp::PortState::kTimeReceiver;
-    if (!other || receives || !held) properties_ = *properties;
+    if (!other || importance(properties->state) > importance(properties_->state)) {
+      properties_ = *properties;
+    }
   } else if (const auto* time = std::get_if<ptp::TimePropertiesDataSet>(&data)) {
     scale_ = reference_scale(time->flags, time->utc_offset);
   }
@@ -53,6 +58,12 @@ void PortWatch::take(const ptp::ManagementData& data, std::int64_t now_ns) {
   answered_ns_ = now_ns;
   port_ = Port{properties_->state, properties_->timestamping != 0,
                std::string(properties_->interface.view()), *scale_};
+}
+
+std::optional<Pairing> pairing(const PortWatch& watch, bool system_may_lead) {
+  if (watch.is_receiving()) return Pairing{watch.port()->interface, true};
+  if (system_may_lead && watch.is_transmitting()) return Pairing{watch.port()->interface, false};
+  return std::nullopt;
 }
 
 }  // namespace ftcs::app

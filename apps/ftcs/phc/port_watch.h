@@ -34,10 +34,11 @@ class PortWatch {
   [[nodiscard]] bool is_receiving() const {
     return port_ && port_->state == ptp::PortState::kTimeReceiver;
   }
-  /// Its clock is the reference or follows one.
-  [[nodiscard]] bool is_synchronised() const {
-    return is_receiving() || (port_ && port_->state == ptp::PortState::kTimeTransmitter);
+  [[nodiscard]] bool is_transmitting() const {
+    return port_ && port_->state == ptp::PortState::kTimeTransmitter;
   }
+  /// Its clock is the reference or follows one.
+  [[nodiscard]] bool is_synchronised() const { return is_receiving() || is_transmitting(); }
 
  private:
   explicit PortWatch(ManagementClient client) : client_(std::move(client)) {}
@@ -51,5 +52,14 @@ class PortWatch {
   std::optional<std::int64_t> asked_ns_;
   std::int64_t answered_ns_ = 0;
 };
+
+/// -a: which clock follows which.
+struct Pairing {
+  std::string interface;   ///< of the hardware clock
+  bool port_leads = true;  ///< the system clock follows it; false: it follows the system clock
+  friend bool operator==(const Pairing&, const Pairing&) = default;
+};
+/// No value: neither follows. `system_may_lead`: a port that transmits follows the system clock.
+[[nodiscard]] std::optional<Pairing> pairing(const PortWatch& watch, bool system_may_lead);
 
 }  // namespace ftcs::app

@@ -33,8 +33,9 @@ struct FakePtpProgram {
       if (question->id == ptp::ManagementId::kPortPropertiesNp) {
         ptp::PortPropertiesNp properties;
         properties.state = state;
+        properties.port.port = port;
         properties.timestamping = hardware ? 1 : 0;
-        properties.interface = ptp::PtpText<32>("eth0");
+        properties.interface = ptp::PtpText<32>(interface);
         answer.data = properties;
       } else {
         answer.data =
@@ -50,6 +51,8 @@ struct FakePtpProgram {
   platform::LocalSocket socket;
   PortState state = PortState::kUncalibrated;
   bool hardware = true;
+  std::uint16_t port = 1;
+  std::string interface = "eth0";
   std::int16_t utc_offset = 37;
   bool silent = false;
 };
@@ -126,6 +129,74 @@ TEST(PortWatch, a_port_that_stops_receiving_is_not_followed) {
   // The kernel's own status goes on being told, once a second; the rate is left alone.
   EXPECT_LE(world.kernel.commands - commands, 32);
   EXPECT_NEAR(world.difference(), 0.0, 1'000.0);
+}
+
+TEST(PortWatch, a_port_that_begins_to_transmit_is_led_by_the_system_clock_only_if_that_may_lead) {
+  for (const bool may_lead : {false, true}) {
+    World world;
+    world.options.system_may_lead = may_lead;
+    world.program.state = PortState::kTimeReceiver;
+    double system_rate = 0.0;
+    world.on_turn = [&] {
+      auto& kernel = world.kernel;
+      if (kernel.ideal_ns > 10e9) world.program.state = PortState::kTimeTransmitter;
+      if (kernel.ideal_ns < 12e9) system_rate = kernel.system.steering();
+      // A while later the hardware clock drifts: who leads now is seen by who follows.
+      if (kernel.ideal_ns > 13e9) kernel.phc.oscillator = 1.0 + 5e-6;
+    };
+    EXPECT_EQ(run_phc(world.kernel, world.options, world.log), may_lead ? kSuccess : kNotLocked);
+    EXPECT_NEAR(world.kernel.system.steering(), system_rate, 1e-9) << "is kept";
+    EXPECT_EQ(std::abs(world.difference()) < 100.0, may_lead) << world.difference();
+    EXPECT_EQ(world.kernel.phc.steering() != 1.0, may_lead);
+  }
+}
+
+TEST(PortWatch, a_system_clock_that_leads_from_the_start_brings_the_hardware_clock_to_tai) {
+  World world;
+  world.options.system_may_lead = true;
+  world.program.state = PortState::kTimeTransmitter;
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kSuccess);
+  EXPECT_NEAR(world.difference(), 0.0, 50.0);
+  EXPECT_NEAR(world.kernel.system.steering(), 1.0, 1e-15);
+}
+
+TEST(PortWatch, the_clock_of_another_port_that_receives_time_is_followed_instead) {
+  World world;
+  world.program.state = PortState::kTimeReceiver;
+  world.on_turn = [&] {
+    if (world.kernel.ideal_ns < 10e9) return;
+    world.program.interface = "eth1";
+    world.kernel.interface_exists = false;  // that is asked for when another clock is opened
+  };
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run_phc(world.kernel, world.options, world.log), kRuntimeError);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("interface eth1: no such device"),
+            std::string::npos);
+  EXPECT_LT(world.kernel.ideal_ns, 15e9);
+}
+
+TEST(PortWatch, of_several_ports_the_receiving_one_counts_and_then_a_transmitting_one) {
+  World world;
+  auto watch = PortWatch::open(world.options.port);
+  ASSERT_TRUE(watch.ok());
+  const auto answer = [&](std::uint16_t port, PortState state) {
+    world.program.port = port;
+    world.program.interface = "eth" + std::to_string(port);
+    world.program.state = state;
+    static std::int64_t now = 0;
+    watch->attend(now += 1'000'000'000);
+    world.program.serve();
+    watch->attend(now += 1'000'000);
+    return watch->port()->state;
+  };
+  EXPECT_EQ(answer(1, PortState::kTimeTransmitter), PortState::kTimeTransmitter);
+  EXPECT_EQ(answer(2, PortState::kListening), PortState::kTimeTransmitter);
+  EXPECT_EQ(answer(2, PortState::kTimeReceiver), PortState::kTimeReceiver);
+  EXPECT_EQ(answer(1, PortState::kTimeTransmitter), PortState::kTimeReceiver);
+  EXPECT_EQ(answer(2, PortState::kListening), PortState::kListening);
+  EXPECT_EQ(answer(1, PortState::kTimeTransmitter), PortState::kTimeTransmitter);
+  EXPECT_EQ(answer(2, PortState::kTimeTransmitter), PortState::kTimeTransmitter);
+  EXPECT_EQ(watch->port()->interface, "eth1") << "no reason to change";
 }
 
 TEST(PortWatch, silence_is_no_state) {
