@@ -29,8 +29,14 @@ expect() {  # exit code, text that the one line must hold, arguments...
 config() { printf '%s\n' "$@" > "$folder/ptp.conf"; }
 
 expect 2 "unknown command 'follow'" follow
+expect 2 "unknown command 'ptp4l'; did you mean 'ptp'?" ptp4l -i lo
+expect 2 "unknown command 'phc2sys'; did you mean 'phc'?" phc2sys -a -r
+expect 2 "unknown command 'statu'; did you mean 'status'?" statu
 expect 2 "subcommand is required"
-expect 2 "--bogus" ptp --bogus
+expect 2 "unknown option '--bogus' (see" ptp --bogus
+expect 2 "unknown option '--domain'; did you mean '--domainNumber'?" ptp -i lo --domain 3
+expect 2 "unknown option '--Delay-mechanism'; did you mean '--delay_mechanism'?" ptp -i lo --Delay-mechanism=E2E
+expect 2 "unexpected argument 'eth0'" ptp -i lo eth0
 expect 2 "(see ftcs ptp --help)" ptp --bogus
 expect 2 "no interface" ptp
 expect 2 "only one port" ptp -i lo -i eth0
@@ -51,6 +57,8 @@ expect 2 "--offset-gain is of the servo ftcs, this one is adaptive: add --servo 
 expect 2 "'1' is no time" ptp -i lo --offset 1
 expect 2 "'50' is no rate" ptp -i lo --skew 50
 expect 2 "--max-frequency: -1000 ppb: expected 1 to 9e+08 ppb" ptp -i lo --max-frequency -1ppm
+expect 2 "--max_frequency: '100ppm': expected a plain number, without a unit" ptp -i lo --max_frequency 100ppm
+expect 2 "--pi_integral_const: '-1': expected a plain number, 0 or more" ptp -i lo --pi_integral_const -1
 expect 2 "--max-frequency-change: '1' is no rate" ptp -i lo --max-frequency-change 1
 expect 2 "--max-frequency-change: -1000 ppb: expected 0 to 9e+08 ppb" ptp -i lo --max-frequency-change -1ppm
 expect 2 "--frequency-granularity: 200000000 ppb: expected 0 to 1e+08 ppb" ptp -i lo --frequency-granularity 200000ppm
@@ -80,6 +88,8 @@ expect 2 "--logSyncInterval: '1': expected an integer from -7 to 0" demo --logSy
 
 config "[global]" "domainNumber 0" "colour blue"
 expect 2 "ptp.conf:3: unknown setting 'colour'" ptp -i lo -f "$folder/ptp.conf"
+config "[global]" "delayMechanism E2E"
+expect 2 "ptp.conf:2: unknown setting 'delayMechanism'; did you mean 'delay_mechanism'?" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "" "# a comment" "delay_mechanism Auto"
 expect 2 "ptp.conf:4: delay_mechanism: 'Auto' is not supported, only E2E and P2P" ptp -i lo -f "$folder/ptp.conf"
 config "[global]" "max_frequency_change 1e10"
@@ -151,6 +161,32 @@ for text in "no time transmitter was found: domain 7, UDPv4, transportSpecific 0
   cat "$folder/out"
   failures=$((failures + 1))
 done
+
+# A file written for ptp4l names its servo, as Debian's does: that is followed, and said.
+config "[global]" "clock_servo pi"
+for servo in "" "--servo adaptive"; do
+  # shellcheck disable=SC2086
+  "$ftcs" ptp -i lo "${ports[@]}" -f "$folder/ptp.conf" $servo --duration 0.1 > "$folder/out"
+  if grep -q "clock_servo pi: the servo is linuxptp-pi" "$folder/out"; then said=yes; else said=; fi
+  [ -z "$servo" ] && [ -n "$said" ] && continue
+  [ -n "$servo" ] && [ -z "$said" ] && continue
+  echo "FAILED: clock_servo pi $servo says:"
+  cat "$folder/out"
+  failures=$((failures + 1))
+done
+
+# And already a while after the start: five Announce intervals.
+"$ftcs" ptp -i lo "${ports[@]}" --logAnnounceInterval -3 --uds_address none > "$folder/out" &
+holder=$!
+for _ in $(seq 50); do grep -q "no time transmitter was found" "$folder/out" && break; sleep 0.1; done
+grep -q "no time transmitter was found" "$folder/out" || {
+  echo "FAILED: nobody there for five Announce intervals, and no word of it:"
+  cat "$folder/out"
+  failures=$((failures + 1))
+}
+kill -TERM "$holder"
+wait "$holder"
+holder=
 
 # What could not be written is an error, whatever was measured.
 if [ -w /dev/full ]; then

@@ -22,8 +22,6 @@ namespace {
 using fuzz::require;
 using namespace std::chrono_literals;
 
-const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
-
 class Script : PtpScript {
  public:
   explicit Script(std::span<const std::uint8_t> octets)

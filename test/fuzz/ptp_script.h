@@ -14,6 +14,9 @@
 
 namespace ftcs::ptp {
 
+/// The port that the scripts drive.
+inline const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
+
 /// Octets as a script: what the scripts for both roles of a port draw from them. Plausible and
 /// extreme values; what lies behind the end reads as zero.
 class PtpScript {

@@ -57,13 +57,14 @@ remove_network() {
 }
 
 # Debian's ptp4l at the other end, steering nothing (free_running): name of its log, lines of its configuration in
-# linuxptp 3.1.1's spelling; later ones win.
+# linuxptp 3.1.1's spelling; later ones win. Its port goes to FAULTY when an answer to a Pdelay_Req comes just after it has
+# changed its state ("rogue peer delay response"): for a quarter of a second instead of 16.
 start_ptp4l() {
   local name=$1
   shift
   printf '%s\n' "[global]" "free_running 1" "time_stamping software" "network_transport UDPv4" \
     "delay_mechanism E2E" "twoStepFlag 1" "tx_timestamp_timeout 50" "logAnnounceInterval -1" \
-    "uds_address $folder/$name.uds" "$@" > "$folder/$name.conf"
+    "fault_reset_interval -2" "uds_address $folder/$name.uds" "$@" > "$folder/$name.conf"
   ip netns exec "$theirs" ptp4l -f "$folder/$name.conf" -i "$their_interface" -m -q \
     > "$folder/$name.log" 2>&1 &
   pids+=($!)

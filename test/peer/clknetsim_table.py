@@ -139,29 +139,30 @@ def ptp4l_config(scenario, folder, name, settings):
     return write(os.path.join(folder, name), "[global]\n" + "".join(f"{k} {v}\n" for k, v in lines.items()))
 
 
-def ptp_transmitter(scenario, folder, tools, settings=None):
-    config = ptp4l_config(scenario, folder, "transmitter.conf", {"free_running": 1, **(settings or {})})
+def ptp_transmitter(scenario, folder, tools, settings):
+    config = ptp4l_config(scenario, folder, "transmitter.conf", {"free_running": 1, **settings})
     return [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]
 
 
-def ftcs(servo, *more):
+def mechanism(scenario, p2p):
+    return {"delay_mechanism": "P2P", "logMinPdelayReqInterval": round(math.log2(scenario.interval))} if p2p else {}
+
+
+def ftcs(servo, *more, p2p=False):
     def commands(scenario, folder, tools):
-        node = [tools["ftcs"], "ptp", "-i", "eth0", "--servo", servo, *(more or ("-H", "--clock", "phc"))]
-        return [ptp_transmitter(scenario, folder, tools), node + (["--first-step"] if scenario.step else [])]
+        node = [tools["ftcs"], "ptp", "-i", "eth0", "-P" if p2p else "-E", "--servo", servo,
+                *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else [])]
+        return [ptp_transmitter(scenario, folder, tools, mechanism(scenario, p2p)), node]
     return commands
 
 
-def ftcs_p2p(scenario, folder, tools):
-    peer = {"delay_mechanism": "P2P", "logMinPdelayReqInterval": round(math.log2(scenario.interval))}
-    node = [tools["ftcs"], "ptp", "-i", "eth0", "-P", "-H", "--clock", "phc"]
-    return [ptp_transmitter(scenario, folder, tools, peer), node + (["--first-step"] if scenario.step else [])]
-
-
-def ptp4l(servo):
+def ptp4l(servo, p2p=False):
     def commands(scenario, folder, tools):
         config = ptp4l_config(scenario, folder, "receiver.conf", {
-            "slaveOnly": 1, "clock_servo": servo, "first_step_threshold": "0.00002" if scenario.step else "0.0"})
-        return [ptp_transmitter(scenario, folder, tools), [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]]
+            "slaveOnly": 1, "clock_servo": servo, "first_step_threshold": "0.00002" if scenario.step else "0.0",
+            **mechanism(scenario, p2p)})
+        node = [tools["ptp4l"], "-f", config, "-i", "eth0", "-m", "-q"]
+        return [ptp_transmitter(scenario, folder, tools, mechanism(scenario, p2p)), node]
     return commands
 
 
@@ -176,9 +177,11 @@ def chronyd(scenario, folder, tools):
     return [[tools["chronyd"], "-d", "-u", "root", "-f", server], [tools["chronyd"], "-d", "-u", "root", "-f", client]]
 
 
-def ftcs_phc(scenario, _folder, tools):
-    return [[tools["ftcs"], "phc", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
-             "-F", "0.00002" if scenario.step else "0"]]
+def ftcs_phc(*more):
+    def commands(scenario, _folder, tools):
+        return [[tools["ftcs"], "phc", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
+                 "-F", "0.00002" if scenario.step else "0", *more]]
+    return commands
 
 
 def phc2sys(servo):
@@ -191,13 +194,16 @@ def phc2sys(servo):
 CANDIDATES = {
     "ftcs": ftcs("adaptive"),
     "ftcs system clock": ftcs("adaptive", "-S", "--clock", "system", "--utc_offset", "0"),
-    "ftcs p2p": ftcs_p2p,
-    "ftcs linuxptp-pi": ftcs("linuxptp-pi"),
+    "ftcs p2p": ftcs("adaptive", p2p=True),
+    "ftcs ptp pi": ftcs("linuxptp-pi"),
     "ptp4l pi": ptp4l("pi"),
     "ptp4l linreg": ptp4l("linreg"),
     "chronyd": chronyd,
+    "ptp4l pi p2p": ptp4l("pi", p2p=True),
+    "ptp4l linreg p2p": ptp4l("linreg", p2p=True),
 }
-PHC_CANDIDATES = {"ftcs phc": ftcs_phc, "phc2sys pi": phc2sys("pi"), "phc2sys linreg": phc2sys("linreg")}
+PHC_CANDIDATES = {"ftcs phc": ftcs_phc(), "ftcs phc pi": ftcs_phc("-E", "pi"), "phc2sys pi": phc2sys("pi"),
+                  "phc2sys linreg": phc2sys("linreg")}
 
 GUARD = ["setpriv", "--bounding-set", "-sys_time", "--inh-caps", "-sys_time"]
 
@@ -254,8 +260,7 @@ def rms(values):
 
 
 def judge(scenario, errors, first):
-    per_cycle, rate = 8, scenario.rate
-    figures = {}
+    per_cycle, rate, figures = 8, scenario.rate, {}
     tail = errors[-MEASURED * per_cycle:]
     figures["rms"], figures["max"] = rms(tail), max(map(abs, tail))
     if scenario.event == "outage":
@@ -265,8 +270,7 @@ def judge(scenario, errors, first):
         at = round(scenario.event_time * rate)
         figures["after 3"] = max(map(abs, errors[at + 3 * per_cycle:at + 100 * per_cycle]))
         figures["overshoot"] = max(0.0, max(errors[at:at + 100 * per_cycle]))  # we start 20 us behind
-    band, dwell = scenario.c5_band * 1e9, 60 * per_cycle
-    run = 0
+    band, dwell, run = scenario.c5_band * 1e9, 60 * per_cycle, 0
     figures["c5"] = math.inf
     for i, error in enumerate(errors):
         run = run + 1 if abs(error) < band else 0
@@ -343,17 +347,15 @@ def main():
     if not shutil.which("setpriv"):
         print("skipped: no setpriv to drop the right to set clocks")
         return 77
-    def find(name):
-        return shutil.which(name) or f"/usr/sbin/{name}"
-    tools = {"ftcs": os.path.realpath(arguments.ftcs), "ptp4l": find("ptp4l"), "phc2sys": find("phc2sys"),
-             "chronyd": arguments.chronyd}
+    tools = {name: shutil.which(name) or f"/usr/sbin/{name}" for name in ("ptp4l", "phc2sys")}
+    tools.update(ftcs=os.path.realpath(arguments.ftcs), chronyd=arguments.chronyd)
     if not os.access(tools["ptp4l"], os.X_OK):
         print("skipped: no ptp4l")
         return 77
     candidates = CANDIDATES if arguments.suite == "ptp" else PHC_CANDIDATES
     scenarios = SCENARIOS if arguments.suite == "ptp" else PHC_SCENARIOS
-    default = [name for name in candidates if name not in ("ftcs system clock", "ftcs p2p", "ftcs linuxptp-pi")
-               and (name != "chronyd" or os.access(tools["chronyd"], os.X_OK))]
+    default = [name for name in candidates if name in ("ftcs", "ftcs phc") or re.fullmatch(r"\w+ (pi|linreg)", name)
+               or (name == "chronyd" and os.access(tools["chronyd"], os.X_OK))]
     missed = []
     print(f"{'scenario':24} {'program':18} {'seeds':>5}  c5 median / worst   rms median / worst   max median / worst")
     for scenario in scenarios:
