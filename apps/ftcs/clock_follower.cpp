@@ -98,55 +98,96 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
 
 std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, FreeRunningTime now,
                                                   std::optional<Duration> sync_interval) {
-  if (options_.peer_to_peer() && !link_delay_.known()) {
-    waiting_ = emitted;
-    return std::nullopt;
+  if (options_.peer_to_peer()) {
+    if (!link_delay_.known() && !shares_timescale()) {
+      waiting_ = emitted;
+      return std::nullopt;
+    }
+    follow_timescale(emitted);
   }
-  EventPair pair = emitted;
-  pair.reference = pair.reference + link_delay_.value();
-  const LocalTime local = clock_.local_at(pair.free_running);
   discipline_.on_announced_interval(sync_interval.value_or(Duration{}));
-  Telemetry telemetry = discipline_.on_pair(pair);
-  if (telemetry.error) {
-    if (auto wrong = on_clock_error(*telemetry.error)) return wrong;
-  }
-  clock_refuses_ = telemetry.error.has_value();
-  if (telemetry.offset_refused) {
-    return fmt::format(
-        "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or allow "
-        "one step (--first-step)",
-        telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9,
-        options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
-  }
-  const double time_s = (now - start_).seconds();
+  const Steered steered = steer(emitted, now);
+  if (steered.failure) return steered.failure;
+  const Telemetry& telemetry = steered.telemetry;
   const bool used = telemetry.verdict == SampleVerdict::kUsed;
-  const bool forward = pair.direction == Direction::kForward;
-  const Duration perceived =
-      offset_from_reference(local, pair.reference + telemetry.servo.path_delay);
-  telemetry.servo.path_delay += link_delay_.value();
-  if (!used) {
-    const bool known = forward && telemetry.servo.offset_known;
-    note_refusal(telemetry, time_s, known ? std::optional(perceived.ns()) : std::nullopt);
-  }
   std::optional<std::string> failure;
-  if (forward) {
+  if (emitted.direction == Direction::kForward) {
     refused_syncs_ = used ? 0 : refused_syncs_ + 1;
     SampleRecord record;
-    record.time_s = time_s;
+    record.time_s = (now - start_).seconds();
     record.offset_known = telemetry.servo.offset_known;
-    record.offset = used ? telemetry.servo.offset : perceived;
+    record.offset = used ? telemetry.servo.offset : steered.perceived;
     record.telemetry = telemetry;
     if (used) {
       status_.last = record;
       status_.has_sample = true;
-      status_.last_local = local;
-      last_used_ = pair.free_running;
+      status_.last_local = steered.local;
+      last_used_ = emitted.free_running;
     }
     failure = report(record, sync_interval);
   }
   follow_lock(now);
   if (used && locked()) state_.note(telemetry.servo, now);
   return failure;
+}
+
+ClockFollower::Steered ClockFollower::steer(EventPair pair, FreeRunningTime now) {
+  const bool forward = pair.direction == Direction::kForward;
+  const Duration delay = delay_taken_off();
+  pair.reference = forward ? pair.reference + delay : pair.reference - delay;
+  Steered result;
+  result.local = clock_.local_at(pair.free_running);
+  Telemetry& telemetry = result.telemetry;
+  telemetry = discipline_.on_pair(pair);
+  if (telemetry.error) result.failure = on_clock_error(*telemetry.error);
+  clock_refuses_ = telemetry.error.has_value();
+  if (!result.failure && telemetry.offset_refused) {
+    result.failure = fmt::format(
+        "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or allow "
+        "one step (--first-step)",
+        telemetry.servo.offset.seconds(), kLargestFirstOffset.count() / 1e9,
+        options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
+  }
+  if (result.failure) return result;
+  result.perceived =
+      offset_from_reference(result.local, pair.reference + telemetry.servo.path_delay);
+  telemetry.servo.path_delay += delay;
+  if (telemetry.verdict != SampleVerdict::kUsed) {
+    const bool known = forward && telemetry.servo.offset_known;
+    note_refusal(telemetry, (now - start_).seconds(),
+                 known ? std::optional(result.perceived.ns()) : std::nullopt);
+  }
+  return result;
+}
+
+// A delay filter that was asked for filters, and is not gone round.
+std::optional<std::string> ClockFollower::on_peer_exchange(const EventPair& request,
+                                                           const EventPair& response,
+                                                           FreeRunningTime now) {
+  if (options_.servo.kind != ServoKind::kAdaptive || options_.delay_filter_given) return {};
+  timescale_.on_response(response);
+  if (!shares_timescale() || !timescale_.checked()) return {};
+  for (const EventPair& pair : {request, response}) {
+    if (auto wrong = steer(pair, now).failure) return wrong;
+  }
+  return {};
+}
+
+void ClockFollower::follow_timescale(const EventPair& sync) {
+  const bool shared = shares_timescale();
+  timescale_.on_sync(sync);
+  if (shares_timescale() && !shared) {
+    start_delay_ = link_delay_.value();
+    static_cast<void>(discipline_.free_path_delay());
+    log_(LogLevel::kInfo, "{}: the transmitter's peer delay messages measure time too", label_);
+  } else if (shared && !shares_timescale()) {
+    log_(
+        LogLevel::kWarning,
+        "{}: the transmitter's peer delay messages are {:.0f} ns off its Syncs; starting anew with "
+        "the link delay alone",
+        label_, timescale_.difference_ns());
+    discipline_.on_new_reference();
+  }
 }
 
 // What may pass is one warning for a series; what will not ends the run.
@@ -171,7 +212,13 @@ void ClockFollower::on_new_link() {
 
 void ClockFollower::on_new_reference() {
   waiting_.reset();
+  timescale_.reset();
   discipline_.on_new_reference();
+}
+
+void ClockFollower::on_new_timescale() {
+  timescale_.reset();
+  discipline_.on_new_timescale();
 }
 
 void ClockFollower::on_silence() {

@@ -12,6 +12,7 @@
 #include "apps/ftcs/sample_report.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/measurement/link_delay.h"
+#include "ftcs/measurement/shared_timescale.h"
 
 namespace ftcs::app {
 
@@ -31,6 +32,12 @@ class ClockFollower {
   [[nodiscard]] std::optional<std::string> on_link_delay(Duration mean_link_delay, bool first,
                                                          FreeRunningTime now,
                                                          std::optional<Duration> sync_interval);
+  /// Peer to peer: the stamps of such an exchange, where the neighbour is the transmitter. While
+  /// they show the time of its Syncs, the adaptive servo hears them too and estimates the path
+  /// delay itself (decision 0015). Returns as on_pair() does.
+  [[nodiscard]] std::optional<std::string> on_peer_exchange(const EventPair& request,
+                                                            const EventPair& response,
+                                                            FreeRunningTime now);
   /// Another link: its delay is not known yet.
   void on_new_link();
   /// Once per turn of the loop.
@@ -38,7 +45,7 @@ class ClockFollower {
   /// Another reference: what was learnt about the old one is void.
   void on_new_reference();
   /// The clock was put onto another timescale: begins anew, the bound of the first offset included.
-  void on_new_timescale() { discipline_.on_new_timescale(); }
+  void on_new_timescale();
   /// At the end: the summary's lines; what was learnt goes to the driftfile.
   void log_summary();
 
@@ -67,6 +74,20 @@ class ClockFollower {
   [[nodiscard]] Status status(FreeRunningTime now) const;
 
  private:
+  struct Steered {
+    Telemetry telemetry;
+    LocalTime local{};                     ///< at the message's event
+    Duration perceived{};                  ///< offset; of a forward message
+    std::optional<std::string> failure{};  ///< why the run must end
+  };
+  [[nodiscard]] Steered steer(EventPair pair, FreeRunningTime now);
+  void follow_timescale(const EventPair& sync);
+  [[nodiscard]] bool shares_timescale() const {
+    return timescale_.verdict() == SharedTimescale::Verdict::kShared;
+  }
+  [[nodiscard]] Duration delay_taken_off() const {
+    return shares_timescale() ? start_delay_ : link_delay_.value();
+  }
   [[nodiscard]] std::optional<std::string> report(const SampleRecord& record,
                                                   std::optional<Duration> sync_interval);
   void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
@@ -83,6 +104,8 @@ class ClockFollower {
   StateKeeper state_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
+  SharedTimescale timescale_;  ///< of the neighbour's stamps
+  Duration start_delay_{};     ///< the link's when the servo began to estimate what it differs by
   std::optional<EventPair> waiting_{};  ///< for the first link delay
   SampleSummary recent_;
   SampleSummary since_lock_;

@@ -158,6 +158,91 @@ TEST_F(PeerToPeerFollower,
   EXPECT_NEAR(link_after_six_late(), 10.0, 1e-6);
 }
 
+/// An exchange 20 ms before the next Sync; the transmitter's stamps are `ahead` of its Syncs.
+class NeighbourIsTransmitter : public PeerToPeerFollower {
+ protected:
+  void cycle(std::int64_t link, std::int64_t ahead = 0) {
+    const std::int64_t asked = at + kSecond / 8 - 20'000'000;
+    const std::int64_t answered = asked + 5'000'000;
+    source.instant = FreeRunningTime::from_ns(answered + link);
+    EXPECT_FALSE(follower->on_peer_exchange(
+        {Direction::kBackward, ReferenceTime::from_ns(asked + link + ahead),
+         FreeRunningTime::from_ns(asked)},
+        {Direction::kForward, ReferenceTime::from_ns(answered + ahead), source.instant},
+        source.now()));
+    sync(link);
+  }
+};
+
+TEST_F(NeighbourIsTransmitter, its_exchanges_count_and_follow_a_path_that_changes) {
+  link_delay(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay);
+  EXPECT_EQ(used(), 100U + 95U) << "five Syncs make four comparisons; forward ones are counted";
+  for (int i = 0; i < 50; ++i) cycle(kDelay + 3'000);  // the link delay is never told again
+  EXPECT_NEAR(error_ns(), 0.0, 10.0);
+  EXPECT_NEAR(follower->status(source.now()).last.telemetry.servo.path_delay.ns(), kDelay + 3'000,
+              10.0);
+}
+
+TEST_F(NeighbourIsTransmitter, stamps_of_another_clock_are_never_heard) {
+  link_delay(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay, 37 * kSecond);
+  EXPECT_EQ(used(), 100U);
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+  EXPECT_EQ(logged(), "") << "they never counted";
+}
+
+TEST_F(NeighbourIsTransmitter, stamps_that_depart_from_the_syncs_are_dropped_and_that_is_said) {
+  link_delay(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay, 500);
+  EXPECT_NE(logged().find("peer delay messages are 500 ns off its Syncs"), std::string::npos);
+  for (int i = 0; i < 100; ++i) cycle(kDelay, 500);
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+}
+
+TEST_F(NeighbourIsTransmitter, another_reference_is_compared_anew) {
+  link_delay(kDelay);
+  for (int i = 0; i < 50; ++i) cycle(kDelay);
+  follower->on_new_reference();
+  const std::uint64_t before = used();
+  for (int i = 0; i < 4; ++i) cycle(kDelay);
+  EXPECT_EQ(used() - before, 4U);
+  for (int i = 0; i < 50; ++i) cycle(kDelay);
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+  EXPECT_EQ(used() - before, 54U + 49U);
+}
+
+TEST_F(NeighbourIsTransmitter, without_syncs_they_do_not_count_for_long) {
+  link_delay(kDelay);
+  for (int i = 0; i < 50; ++i) cycle(kDelay);
+  const std::uint64_t before = used();
+  for (int i = 0; i < 100; ++i) {
+    at += kSecond;
+    const FreeRunningTime now = source.instant = FreeRunningTime::from_ns(at + kDelay);
+    const EventPair request{Direction::kBackward, ReferenceTime::from_ns(at + kDelay - 1'000'000),
+                            FreeRunningTime::from_ns(at - 1'000'000)};
+    EXPECT_FALSE(follower->on_peer_exchange(
+        request, {Direction::kForward, ReferenceTime::from_ns(at), now}, now));
+  }
+  EXPECT_EQ(used() - before, 15U);
+}
+
+TEST_F(NeighbourIsTransmitter, a_filter_that_was_chosen_or_another_servo_is_not_gone_round) {
+  const auto used_after = [this] {
+    follower.emplace(options, log, clock, source.now(), false, "test");
+    link_delay(kDelay);
+    for (int i = 0; i < 50; ++i) cycle(kDelay);
+    return used();
+  };
+  EXPECT_EQ(used_after(), 95U);
+  options.delay_filter_given = true;
+  EXPECT_EQ(used_after(), 50U);
+  options.delay_filter_given = false;
+  options.servo.kind = ServoKind::kFtcs;
+  EXPECT_EQ(used_after(), 50U);
+}
+
 TEST_F(PeerToPeerFollower, what_waits_for_the_link_delay_goes_with_its_reference) {
   sync(kDelay);
   follower->on_new_reference();

@@ -47,6 +47,9 @@ class ClockDiscipline {
   /// What the time transmitter says of its Sync interval; zero: nothing. Messages that come in a
   /// burst are then not taken for a shorter one.
   void on_announced_interval(Duration interval) noexcept { announced_interval_ = interval; }
+  /// From now on the path delay is estimated from messages of both directions, whatever the
+  /// configuration says; until the next reference. False if the servo cannot.
+  [[nodiscard]] bool free_path_delay() noexcept { return servo_.free_path_delay(); }
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <variant>
 
 #include "ftcs/ptp/port_state.h"
@@ -44,11 +45,20 @@ struct EmitPair {
   EventPair pair{};
 };
 
+/// What a Pdelay_Req and its Pdelay_Resp say of the time, in the order of their events.
+struct PeerStamps {
+  EventPair request{};   ///< t1 by our clock, t2 by the neighbour's: backward
+  EventPair response{};  ///< t3 by the neighbour's clock, t4 by ours: forward
+};
+
 /// One exchange of peer delay messages (11.4), for the measurement.
 struct EmitPeerDelay {
   Duration mean_link_delay{};  ///< without asymmetry, by the reference, else the neighbour
   Rate neighbor_rate_ratio;    ///< of the neighbour's clock in units of ours; 1 until known
   bool first = false;          ///< the first one of this link: what was measured before is void
+  /// Where the neighbour is the followed transmitter and has told both stamps: its clock shows what
+  /// it transmits, and the exchange measures time, as Delay_Req and Sync do.
+  std::optional<PeerStamps> stamps{};
 };
 
 struct PortStateChanged {

@@ -249,9 +249,24 @@ void PeerDelay::complete_if_ready(Port& port, ActionList& actions) noexcept {
   if (abs(delay) > Duration{kMaximumPeerDelay}) return port.count(Counter::kAbsurdPeerDelay);
   if (suspicious_ > 0) return;
   port.count(Counter::kPeerDelays);
-  port.push(EmitPeerDelay{scale(delay, reference_rate_), rate_ratio_, !measured_}, actions);
+  port.push(EmitPeerDelay{scale(delay, reference_rate_), rate_ratio_, !measured_, stamps()},
+            actions);
   measured_ = true;
   mean_link_delay_ = delay;
+}
+
+/// Both references get the asymmetry, as those of Sync and Delay_Req do (TimeReceiver::emit).
+std::optional<PeerStamps> PeerDelay::stamps() const noexcept {
+  const Exchange& exchange = exchange_;
+  // A one-step answer tells the turn-around alone, and so may a two-step one: both stamps are zero.
+  const bool told = exchange.two_step && exchange.request_receipt != ReferenceTime{} &&
+                    exchange.response_origin != ReferenceTime{};
+  if (!told || transmitter_ != exchange.responder) return std::nullopt;
+  const ReferenceTime t2 = exchange.request_receipt - exchange.correction + config_.asymmetry;
+  const ReferenceTime t3 =
+      exchange.response_origin + exchange.follow_up_correction + config_.asymmetry;
+  return PeerStamps{{Direction::kBackward, t2, exchange.t1},
+                    {Direction::kForward, t3, exchange.t4}};
 }
 
 /// 802.1AS-2020, 11.2.19.3.3: how far t3 and t4 advanced from the oldest answer kept to this one.

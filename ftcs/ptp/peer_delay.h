@@ -24,6 +24,8 @@ struct PeerDelayConfig {
   Nanoseconds lowest{-20'000'000};  ///< min_neighbor_prop_delay
   Nanoseconds highest{20'000'000};  ///< neighborPropDelayThresh
   std::uint8_t allowed_losses = 9;  ///< allowedLostResponses, 802.1AS-2020, 11.5.3
+  /// Of the way to us over the mean (7.4.2); the mean link delay is without it, the stamps are not.
+  Duration asymmetry{};
 };
 
 /// A mean link delay beyond this is nonsense, whatever the link.
@@ -61,6 +63,11 @@ class PeerDelay {
   void set_reference_rate(Rate reference_per_neighbour) noexcept {
     reference_rate_ = reference_per_neighbour;
   }
+  /// The followed transmitter; none: nobody is, or its Syncs and its neighbours' stamps are not of
+  /// one timescale (802.1AS, where each clock runs freely).
+  void set_transmitter(const std::optional<PortIdentity>& port) noexcept { transmitter_ = port; }
+  /// The reference has jumped: an exchange that is open has stamps of before and after.
+  void abandon_exchange() noexcept { exchange_.open = false; }
   /// asCapable (802.1AS-2020, 10.2.5.1); always true where it is not needed.
   [[nodiscard]] bool capable() const noexcept;
   [[nodiscard]] Rate neighbor_rate_ratio() const noexcept { return rate_ratio_; }
@@ -114,6 +121,7 @@ class PeerDelay {
   void complete_if_ready(Port& port, ActionList& actions) noexcept;
   void measure_rate(Port& port) noexcept;
   void forget_rate() noexcept;
+  [[nodiscard]] std::optional<PeerStamps> stamps() const noexcept;
   [[nodiscard]] Answer* find_answer(const EventId& id) noexcept;
 
   PeerDelayConfig config_;
@@ -134,6 +142,7 @@ class PeerDelay {
   bool measured_ = false;
   Duration mean_link_delay_{};
   PortIdentity neighbour_{};
+  std::optional<PortIdentity> transmitter_{};
   std::uint8_t losses_ = 0;      ///< requests in a row that nobody answered
   std::uint8_t suspicious_ = 0;  ///< requests to come that must have one answer before one counts
 };

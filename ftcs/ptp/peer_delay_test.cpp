@@ -138,6 +138,71 @@ TEST_F(PeerDelayTest, a_two_step_answer_may_tell_the_difference_alone) {
   EXPECT_EQ(delays[0].mean_link_delay, Duration{kLink});
 }
 
+TEST_F(PeerDelayTest, the_transmitters_own_stamps_are_told_and_nobody_elses) {
+  EXPECT_FALSE(exchange(0s).at(0).stamps);
+  peer_.set_transmitter(kStranger);
+  EXPECT_FALSE(exchange(1s).at(0).stamps);
+  peer_.set_transmitter(kNeighbour);
+  const auto told = exchange(2s);
+  ASSERT_EQ(told.size(), 1U);
+  ASSERT_TRUE(told[0].stamps);
+  const auto& [request, response] = *told[0].stamps;
+  EXPECT_EQ(request.direction, Direction::kBackward);
+  EXPECT_EQ(request.free_running, ours(2s));
+  EXPECT_NEAR((request.reference - neighbours(2s + kLink)).ns(), 0.0, 1.0);  // whole ns on the wire
+  EXPECT_EQ(response.direction, Direction::kForward);
+  EXPECT_EQ(response.free_running, ours(2s + 2 * kLink + kTurnAround));
+  EXPECT_NEAR((response.reference - neighbours(2s + kLink + kTurnAround)).ns(), 0.0, 1.0);
+}
+
+TEST_F(PeerDelayTest, both_stamps_must_be_told) {
+  peer_.set_transmitter(kNeighbour);
+  for (const bool receipt : {false, true}) {
+    const Nanoseconds at = receipt ? 1s : 0s;
+    const auto id = ask(at);
+    static_cast<void>(stamp(id, at));
+    Message answer = response(id, at + kLink);
+    std::get<PdelayResp>(answer.body).request_receipt =
+        receipt ? neighbours(at + kLink) : ReferenceTime{};
+    static_cast<void>(hand_over(answer, at + 2 * kLink + kTurnAround));
+    Message last = message(id, PdelayRespFollowUp{ReferenceTime{}, kUs});
+    last.header.correction = Duration{receipt ? 0ms : kTurnAround};
+    for (const EmitPeerDelay& delay : of<EmitPeerDelay>(hand_over(last, at + 20ms))) {
+      EXPECT_FALSE(delay.stamps);
+    }
+  }
+}
+
+TEST_F(PeerDelayTest, stamps_have_the_corrections_and_the_asymmetry) {
+  PeerDelayConfig config;
+  config.asymmetry = Duration{30ns};
+  peer_ = PeerDelay{config};
+  peer_.start(ours(0s));
+  peer_.set_transmitter(kNeighbour);
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  Message answer = response(id, kLink);
+  answer.header.correction = Duration::from_ns(-0.5);  // t2 is half a nanosecond later
+  static_cast<void>(hand_over(answer, 2 * kLink));
+  Message last = follow_up(id, kLink);
+  last.header.correction = Duration::from_ns(0.25);
+  const auto told = of<EmitPeerDelay>(hand_over(last, 3 * kLink));
+  ASSERT_EQ(told.size(), 1U);
+  ASSERT_TRUE(told[0].stamps);
+  const ReferenceTime on_wire{Duration{Nanoseconds{neighbours(kLink).since_epoch().floor_ns()}}};
+  EXPECT_EQ(told[0].stamps->request.reference - on_wire, Duration::from_ns(30.5));
+  EXPECT_EQ(told[0].stamps->response.reference - on_wire, Duration::from_ns(30.25));
+}
+
+TEST_F(PeerDelayTest, an_abandoned_exchange_says_nothing) {
+  const auto id = ask(0s);
+  static_cast<void>(stamp(id, 0s));
+  static_cast<void>(hand_over(response(id, kLink), 2 * kLink));
+  peer_.abandon_exchange();
+  EXPECT_TRUE(of<EmitPeerDelay>(hand_over(follow_up(id, kLink), 3 * kLink)).empty());
+  EXPECT_EQ(exchange(1s).size(), 1U);
+}
+
 TEST_F(PeerDelayTest, stamp_answer_and_follow_up_may_come_in_any_order) {
   const auto complete = [this](int order, Nanoseconds at) {
     const auto id = ask(at);

@@ -17,6 +17,12 @@ PortConfig port_config(const TimeReceiverConfig& config) noexcept {
           config.minor_version, config.unicast, config.assume_two_step};
 }
 
+PeerDelayConfig peer_delay_config(const TimeReceiverConfig& config) noexcept {
+  PeerDelayConfig peer_delay = config.peer_delay;
+  peer_delay.asymmetry = config.delay_asymmetry;
+  return peer_delay;
+}
+
 /// The earlier one of two times that may be unknown.
 std::optional<FreeRunningTime> earlier(std::optional<FreeRunningTime> a,
                                        std::optional<FreeRunningTime> b) noexcept {
@@ -29,7 +35,7 @@ std::optional<FreeRunningTime> earlier(std::optional<FreeRunningTime> a,
 TimeReceiver::TimeReceiver(const Config& config) noexcept
     : config_(config),
       port_(port_config(config)),
-      peer_delay_(config.peer_delay),
+      peer_delay_(peer_delay_config(config)),
       delay_requests_(config.log_min_delay_req_interval, config.seed) {}
 
 ActionList TimeReceiver::start(FreeRunningTime now) noexcept {
@@ -189,6 +195,7 @@ void TimeReceiver::select(const TransmitterData& data, FreeRunningTime now,
   port_.push(TransmitterSelected{data, changed}, actions);
   if (same_port) return;
   if (!measured) forget_exchanges();
+  if (config_.major_sdo_id == 0) peer_delay_.set_transmitter(data.port);
   last_sync_ = now;
   if (port_.state() != PortState::kUncalibrated) {
     port_.change_state(PortState::kUncalibrated, PortEvent::kRecommendedReceiver, actions);
@@ -242,6 +249,7 @@ void TimeReceiver::check_for_jump(const EventPair& forward, FreeRunningTime now,
   port_.count(Counter::kReferenceJumps);
   // A request from before the jump would be answered after it: half the jump would look like delay.
   if (delay_requests_.running()) delay_requests_.restart(now, port_.counters());
+  peer_delay_.abandon_exchange();
   fast_start_.forget_pairs();
   if (has_transmitter_) port_.push(ReferenceJumped{jump}, actions);
 }
@@ -252,6 +260,7 @@ void TimeReceiver::forget_exchanges() noexcept {
   last_forward_ = LastPair{};
   has_information_ = false;
   peer_delay_.set_reference_rate(Rate{});
+  peer_delay_.set_transmitter(std::nullopt);
   sync_interval_.reset();
 }
 

@@ -51,6 +51,33 @@ TEST_F(PeerReceiver, takes_pairs_from_sync_and_never_asks_for_an_end_to_end_dela
   EXPECT_EQ(count(Counter::kDelayIgnored), 1U);
 }
 
+TEST_F(PeerReceiver, the_neighbours_stamps_count_while_it_is_the_transmitter) {
+  EXPECT_FALSE(peer_exchange(0s).at(0).stamps);
+  select_a();
+  EXPECT_TRUE(peer_exchange(1s).at(0).stamps);
+  static_cast<void>(general(announce_from(kB, 1), 2s));
+  static_cast<void>(general(announce_from(kB, 1), 2s + 250ms));
+  ASSERT_EQ(receiver_.transmitter()->port, kB);
+  EXPECT_FALSE(peer_exchange(3s).at(0).stamps);
+}
+
+TEST_F(PeerReceiver, an_exchange_during_which_the_reference_jumps_is_void) {
+  select_a();
+  static_cast<void>(exchange(1, 500ms));
+  const auto asked = of<SendMessage>(receiver_.on_timer(local(1s)));
+  ASSERT_EQ(asked.size(), 1U);
+  static_cast<void>(receiver_.on_transmit_timestamp(asked[0].id(), local(1s), local(1s)));
+  Message answer = message_from(kA, asked[0].sequence_id, PdelayResp{reference(1s), kUs});
+  answer.header.flags = flag::kTwoStep;
+  static_cast<void>(event(answer, 1s + 1ms));
+  static_cast<void>(event(sync_from(kA, 2), 1s + 2ms));
+  ASSERT_EQ(of<ReferenceJumped>(general(follow_up(2, 11s), 1s + 2ms)).size(), 1U);
+  EXPECT_TRUE(of<EmitPeerDelay>(general(message_from(kA, asked[0].sequence_id,
+                                                     PdelayRespFollowUp{reference(11s), kUs}),
+                                        1s + 3ms))
+                  .empty());
+}
+
 TEST_F(PeerReceiver, answers_its_neighbour) {
   const auto actions = event(message_from(kA, 9, PdelayReq{}), 1s);
   const auto answer = of<SendMessage>(actions);
@@ -150,6 +177,7 @@ TEST_F(GptpReceiver, knows_how_fast_the_grandmaster_is) {
   }();
   ASSERT_EQ(delays.size(), 1U);
   EXPECT_NEAR(delays[0].mean_link_delay.ns(), 10'001.0, 0.1);
+  EXPECT_FALSE(delays[0].stamps) << "its clock runs freely";
 }
 
 TEST_F(GptpReceiver, is_told_of_jumps_that_it_could_not_see) {

@@ -118,6 +118,12 @@ void AnyServo::on_step(Duration step) noexcept {
       servo_);
 }
 
+bool AnyServo::free_path_delay() noexcept {
+  auto* const adaptive = std::get_if<AdaptiveServo>(&servo_);
+  if (adaptive != nullptr) adaptive->free_path_delay();
+  return adaptive != nullptr;
+}
+
 ServoSnapshot AnyServo::snapshot() const noexcept {
   return std::visit([](const auto& servo) noexcept { return servo.snapshot(); }, servo_);
 }

@@ -151,7 +151,8 @@ def mechanism(scenario, p2p):
 def ftcs(servo, *more, p2p=False):
     def commands(scenario, folder, tools):
         node = [tools["ftcs"], "ptp", "-i", "eth0", "-P" if p2p else "-E", "--servo", servo,
-                *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else [])]
+                *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else []),
+                *(f"--{key}={value}" for key, value in mechanism(scenario, p2p).items())]
         return [ptp_transmitter(scenario, folder, tools, mechanism(scenario, p2p)), node]
     return commands
 

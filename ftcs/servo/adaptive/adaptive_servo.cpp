@@ -63,6 +63,7 @@ BasicAdaptiveServo<Grid>::BasicAdaptiveServo(const AdaptiveConfig& config) noexc
 
 template <class Grid>
 void BasicAdaptiveServo<Grid>::reset() noexcept {
+  estimator_.fix_delay();
   forget();
   order_.reset();
   steering_.reset();
@@ -87,7 +88,7 @@ template <class Grid>
 Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
-  const adaptive::KnownDelay& known = estimator_.known_delay();
+  const adaptive::KnownDelay known = estimator_.known_delay();
   const double shift = known.known() ? sign * known.mean_ns : 0.0;
   const ReferenceTime event = pair.reference + Duration::from_ns(shift);
   Observation seen;

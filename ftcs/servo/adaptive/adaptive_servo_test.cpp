@@ -98,6 +98,33 @@ TEST(AdaptiveServo, one_direction_suffices_if_the_path_delay_is_known) {
   EXPECT_LE(result.rms_ns, 12.0);
 }
 
+/// Messages 125 ms apart on a path of 11 us that was said to take 10; returns the last snapshot.
+ServoSnapshot follow(AdaptiveServo& servo, int from, int to) {
+  for (int i = from; i < to; ++i) {
+    const bool forward = i % 2 == 0;
+    const std::int64_t at = 125'000'000LL * i;
+    const std::int64_t reference = at + (forward ? -11'000 : 11'000);
+    const TimestampPair pair{forward ? Direction::kForward : Direction::kBackward,
+                             ReferenceTime::from_ns(reference), LocalTime::from_ns(at),
+                             FreeRunningTime::from_ns(at)};
+    static_cast<void>(servo.update(pair, {pair.free_running, pair.local}));
+  }
+  return servo.snapshot();
+}
+
+TEST(AdaptiveServo, a_path_delay_that_was_given_may_be_set_free) {
+  AdaptiveConfig config;
+  config.fixed_path_delay = Nanoseconds{10'000};
+  AdaptiveServo servo{config};
+  EXPECT_NEAR(follow(servo, 0, 100).path_delay.ns(), 10'000.0, 0.01);
+  servo.free_path_delay();
+  const ServoSnapshot free = follow(servo, 100, 300);
+  EXPECT_NEAR(free.path_delay.ns(), 11'000.0, 1.0);
+  EXPECT_NEAR(free.offset.ns(), 0.0, 1.0);
+  servo.reset();
+  EXPECT_NEAR(follow(servo, 300, 310).path_delay.ns(), 10'000.0, 0.01);
+}
+
 TEST(AdaptiveServo, the_small_variant_locks_as_quickly_and_stays_below_the_noise) {
   std::vector<double> c5, rms;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {

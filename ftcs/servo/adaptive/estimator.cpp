@@ -68,16 +68,18 @@ double common_deviation(double variances, int sides) noexcept {
 
 template <class Grid>
 bool Estimator<Grid>::observable() const noexcept {
-  return two_way() || known_delay_.known() || count_ > kMixFrom;
+  return two_way() || known_delay().known() || count_ > kMixFrom;
 }
 
 template <class Grid>
 void Estimator<Grid>::restart() noexcept {
   const KnownDelay delay = known_delay_;
   const double least_noise = least_noise_;
+  const bool delay_freed = delay_freed_;
   ::new (static_cast<void*>(this))
       Estimator(delay);  // in place: too large for the stack of a real-time thread
   least_noise_ = least_noise;
+  delay_freed_ = delay_freed;
 }
 
 /// Kept in the mixed estimate, which nobody else needs before the first message.
@@ -94,9 +96,9 @@ void Estimator<Grid>::begin(std::size_t side) noexcept {
   start.xx = kOffsetPrior;
   start.y = mixed_.y;
   start.yy = mixed_.yy > 0.0 ? mixed_.yy : kRatePrior;
-  if (known_delay_.known()) {
-    start.d = known_delay_.mean_ns;
-    start.dd = known_delay_.sigma_ns * known_delay_.sigma_ns / (scale_ * scale_);
+  if (const KnownDelay known = known_delay(); known.known()) {
+    start.d = known.mean_ns;
+    start.dd = known.sigma_ns * known.sigma_ns / (scale_ * scale_);
   }
   bank_.start(start);
   seen_[side] = true;
@@ -110,7 +112,7 @@ template <class Grid>
 void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
-  if (known_delay_.known()) return;
+  if (known_delay().known()) return;
   const double first_sign = -sign_of(side);
   bank_.for_each([first_sign](Estimate& e) {
     e.xx += kDelayPrior;
@@ -238,7 +240,8 @@ void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innova
   const bool young =
       (count_ <= kOpinionOften || evidence_.messages() < kOpinionOften) && second_opinion_.full();
   const double contradiction = young ? kYoungContradiction : kContradiction;
-  const FreshFit fit = second_opinion_.consult({delay_free(), known_delay_.mean_ns, contradiction});
+  const FreshFit fit =
+      second_opinion_.consult({delay_free(), known_delay().mean_ns, contradiction});
   if (fit.better) start_again(fit);
 }
 
@@ -257,8 +260,8 @@ template <class Grid>
 void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   Estimate start = fit.estimate;
   scale_ = robust_scale_ = std::max(fit.scale_ns, least_noise_);
-  if (known_delay_.known()) {
-    const double sigma = known_delay_.sigma_ns / scale_;
+  if (const KnownDelay known = known_delay(); known.known()) {
+    const double sigma = known.sigma_ns / scale_;
     start.dd = sigma * sigma;
     start.xx += start.dd;
   }

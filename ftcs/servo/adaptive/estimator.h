@@ -39,7 +39,8 @@ template <class Grid>
 class Estimator {
  public:
   explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
-  /// Forgets everything but the known delay, in place: a temporary would be kilobytes of stack.
+  /// Forgets everything but what is known of the delay, in place: a temporary would be kilobytes of
+  /// stack.
   void restart() noexcept;
 
   /// Before the first message: a rate and a timestamp noise (ns) to start from. The noise is a
@@ -48,6 +49,11 @@ class Estimator {
 
   /// No noise is smaller than this, ns: what rounds the timestamps makes some.
   void expect_noise_of_at_least(double noise_ns) noexcept { least_noise_ = noise_ns; }
+
+  /// The delay that was known is estimated from now on: messages of the other direction will come.
+  void free_delay() noexcept { delay_freed_ = true; }
+  /// It is known again. Before the first message only.
+  void fix_delay() noexcept { delay_freed_ = false; }
 
   /// Returns the probability that the message is no outlier.
   double update(const Observation& seen) noexcept;
@@ -64,7 +70,9 @@ class Estimator {
   [[nodiscard]] double delay_sigma_ns() const noexcept;
   /// Noise of one timestamp of the given direction, ns.
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
-  [[nodiscard]] const KnownDelay& known_delay() const noexcept { return known_delay_; }
+  [[nodiscard]] KnownDelay known_delay() const noexcept {
+    return delay_freed_ ? KnownDelay{} : known_delay_;
+  }
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
   /// Gain of the last raw innovation on the offset: the effective p.
@@ -96,7 +104,7 @@ class Estimator {
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
   /// The path delay is estimated, not given or pinned.
-  [[nodiscard]] bool delay_free() const noexcept { return two_way() && !known_delay_.known(); }
+  [[nodiscard]] bool delay_free() const noexcept { return two_way() && !known_delay().known(); }
   void follow_surprise(std::size_t side, const Innovations& innovations) noexcept;
   [[nodiscard]] double widening() const noexcept;
   [[nodiscard]] double floor_doubt_ns() const noexcept;
@@ -119,6 +127,7 @@ class Estimator {
   std::uint32_t count_ = 0;
   std::uint32_t since_change_ = 0;
   bool diverged_ = false;
+  bool delay_freed_ = false;
   std::uint8_t surprise_ = 0;  ///< messages for which the second opinion is still sought
   double scale_ = 100.0;
   double robust_scale_ = 100.0;

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/measurement/order_statistic.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs {
+
+/// Whether other messages from the transmitter's port show the time that its Syncs show. IEEE 1588
+/// does not promise it of peer delay messages: their stamps may be those of a clock that runs
+/// freely (802.1AS has it so), or be taken elsewhere. So it is measured:
+///
+///     D = response - Sync, both reference minus free-running, Sync interpolated to the response.
+///
+/// One path, so D is noise of mean zero if the time is one. Judged is the median of the last
+/// differences against its standard error by their median absolute deviation; no limit in ns.
+class SharedTimescale {
+ public:
+  enum class Verdict : std::uint8_t {
+    kOpen,
+    kShared,   ///< until kForeign
+    kForeign,  ///< until reset()
+  };
+  static constexpr std::size_t kFewest = 4;
+  static constexpr std::size_t kWindow = 64;
+
+  /// A Sync, whose direction is forward.
+  void on_sync(const EventPair& sync) noexcept {
+    if (has_sync_ && has_response_) compare(sync);
+    sync_ = sync;
+    has_sync_ = true;
+    has_response_ = false;
+    unchecked_ = 0;
+  }
+  /// Another message from the same port, forward too. The last one before a Sync is compared.
+  void on_response(const EventPair& response) noexcept {
+    response_ = response;
+    has_response_ = true;
+    unchecked_ = std::min(unchecked_ + 1, kUncheckedLimit);
+  }
+  void reset() noexcept { *this = SharedTimescale{}; }
+  [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
+  /// Syncs still come: without them nothing says that the time is one.
+  [[nodiscard]] bool checked() const noexcept { return unchecked_ < kUncheckedLimit; }
+  /// Median of the last differences, ns: the time that the responses show is later by this.
+  [[nodiscard]] double difference_ns() const noexcept { return median_; }
+
+ private:
+  static constexpr int kUncheckedLimit = 16;
+  /// Of a median of normal values over that of their mean, and of a MAD; stamps are whole ns.
+  static constexpr double kMedianError = 1.2533;
+  static constexpr double kMadToSigma = 1.4826;
+  static constexpr double kLeastMadNs = 1.0;
+  static constexpr double kSharedBelow = 3.0;
+  /// A false alarm costs a new start: with 64 values the MAD itself may be a third too small.
+  static constexpr double kForeignAbove = 8.0;
+
+  void compare(const EventPair& sync) noexcept {
+    const double span = (sync.free_running - sync_.free_running).ns();
+    const double ahead = (response_.free_running - sync_.free_running).ns();
+    if (!(ahead >= 0.0 && ahead < span)) return;
+    const double by_sync = (sync.reference - sync_.reference).ns() * (ahead / span);
+    differences_[next_] = (response_.reference - sync_.reference).ns() - by_sync;
+    next_ = (next_ + 1) % kWindow;
+    size_ = std::min(size_ + 1, kWindow);
+    judge();
+  }
+  void judge() noexcept {
+    median_ = median_of(differences_);
+    if (size_ < kFewest || verdict_ == Verdict::kForeign) return;
+    std::array<double, kWindow> distances{};
+    for (std::size_t i = 0; i < size_; ++i) distances[i] = std::abs(differences_[i] - median_);
+    const double sigma = kMadToSigma * std::max(kLeastMadNs, median_of(distances));
+    const double error = kMedianError * sigma / std::sqrt(static_cast<double>(size_));
+    if (size_ == kWindow && std::abs(median_) > kForeignAbove * error) {
+      verdict_ = Verdict::kForeign;
+    } else if (std::abs(median_) <= kSharedBelow * error) {
+      verdict_ = Verdict::kShared;
+    }
+  }
+  [[nodiscard]] double median_of(std::array<double, kWindow> values) const noexcept {
+    const auto size = static_cast<std::ptrdiff_t>(size_);
+    const double low = order_statistic(values, size, (size - 1) / 2);
+    const double high = order_statistic(values, size, size / 2);
+    return low + (high - low) / 2.0;
+  }
+
+  EventPair sync_{};
+  EventPair response_{};
+  bool has_sync_ = false;
+  bool has_response_ = false;
+  int unchecked_ = 0;
+  Verdict verdict_ = Verdict::kOpen;
+  std::array<double, kWindow> differences_{};
+  std::size_t next_ = 0;
+  std::size_t size_ = 0;
+  double median_ = 0.0;
+};
+
+}  // namespace ftcs

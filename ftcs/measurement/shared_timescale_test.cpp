@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+// World: a transmitter whose Syncs leave once a second, and which answers a request between every
+// two of them; our oscillator is 50 ppm fast. Each message is late by noise of its own.
+#include "ftcs/measurement/shared_timescale.h"
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/time/rate.h"
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs {
+namespace {
+
+using Verdict = SharedTimescale::Verdict;
+using Noise = std::function<double(std::mt19937_64&)>;
+
+double normal(std::mt19937_64& random, double sigma) {
+  return std::normal_distribution<double>(0.0, sigma)(random);
+}
+double chance(std::mt19937_64& random) { return std::uniform_real_distribution<double>()(random); }
+
+class SharedTimescaleTest : public testing::Test {
+ protected:
+  /// A second: a response whose stamp is `ahead` of the transmitter's time, then a Sync.
+  void second(double ahead) {
+    watch.on_response(pair(at_ + 0.1 + 0.8 * chance(random), ahead + noise(random)));
+    sync();
+  }
+  void sync() { watch.on_sync(pair(at_ += 1.0, noise(random))); }
+  static EventPair pair(double at_s, double reference_ns) {
+    const Duration elapsed = Duration::from_ns(at_s * 1e9);
+    return {Direction::kForward,
+            ReferenceTime{elapsed + Duration{Nanoseconds{1'800'000'000'000'000'000}}} +
+                Duration::from_ns(std::round(reference_ns)),
+            FreeRunningTime{scale(elapsed, Rate::from_ppm(50.0))}};
+  }
+
+  SharedTimescale watch;
+  std::mt19937_64 random{7};
+  Noise noise = [](std::mt19937_64& from) { return normal(from, 10.0); };
+
+ private:
+  double at_ = 0.0;
+};
+
+TEST_F(SharedTimescaleTest, four_comparisons_suffice) {
+  sync();
+  for (int i = 0; i < 3; ++i) second(0.0);
+  EXPECT_EQ(watch.verdict(), Verdict::kOpen);
+  second(0.0);
+  EXPECT_EQ(watch.verdict(), Verdict::kShared);
+}
+
+TEST_F(SharedTimescaleTest, a_clock_of_its_own_is_never_taken_for_the_transmitters) {
+  for (const double ahead : {37e9, -1e6, 200.0}) {
+    watch.reset();
+    sync();
+    for (int i = 0; i < 64; ++i) {
+      ASSERT_EQ(watch.verdict(), Verdict::kOpen) << ahead << ", " << i;
+      second(ahead);
+    }
+    EXPECT_EQ(watch.verdict(), Verdict::kForeign);
+    EXPECT_NEAR(watch.difference_ns(), ahead, 10.0);
+  }
+}
+
+TEST_F(SharedTimescaleTest, is_found_out_when_it_departs) {
+  sync();
+  for (int i = 0; i < 200; ++i) second(0.0);
+  ASSERT_EQ(watch.verdict(), Verdict::kShared);
+  for (int i = 0; i < 64; ++i) second(20.0);
+  EXPECT_EQ(watch.verdict(), Verdict::kForeign);
+}
+
+TEST_F(SharedTimescaleTest, noise_of_any_shape_is_no_difference) {
+  const Noise shapes[] = {
+      [](std::mt19937_64&) { return 0.0; },
+      [](std::mt19937_64& from) { return normal(from, 1'000.0); },
+      [](std::mt19937_64& from) { return -std::exponential_distribution<double>(1e-3)(from); },
+      [](std::mt19937_64& from) {  // one in ten is late by up to 100 us
+        return normal(from, 100.0) - (chance(from) < 0.1 ? 1e5 * chance(from) : 0.0);
+      },
+      [](std::mt19937_64& from) { return chance(from) < 0.3 ? -2'000.0 : normal(from, 20.0); }};
+  for (const Noise& shape : shapes) {
+    noise = shape;
+    watch.reset();
+    sync();
+    for (int i = 0; i < 20'000; ++i) second(0.0);
+    EXPECT_EQ(watch.verdict(), Verdict::kShared) << &shape - shapes;
+  }
+}
+
+TEST_F(SharedTimescaleTest, without_syncs_nothing_says_so_any_more) {
+  sync();
+  for (int i = 0; i < 10; ++i) second(0.0);
+  EXPECT_TRUE(watch.checked());
+  for (int i = 0; i < 16; ++i) watch.on_response(pair(20.0 + i, 0.0));
+  EXPECT_FALSE(watch.checked());
+  EXPECT_EQ(watch.verdict(), Verdict::kShared);
+}
+
+TEST_F(SharedTimescaleTest, compares_only_what_came_between_two_syncs) {
+  watch.on_sync(pair(1.0, 0.0));
+  for (int i = 0; i < 10; ++i) {
+    watch.on_response(pair(1.5 + i - 1.0, 0.0));  // older than the last Sync
+    watch.on_sync(pair(2.0 + i, 0.0));
+  }
+  EXPECT_EQ(watch.verdict(), Verdict::kOpen);
+}
+
+TEST_F(SharedTimescaleTest, does_not_allocate) {
+  const test::ForbidAllocation guard;
+  sync();
+  for (int i = 0; i < 100; ++i) second(0.0);
+}
+
+}  // namespace
+}  // namespace ftcs
