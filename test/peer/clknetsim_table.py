@@ -382,7 +382,7 @@ def main():
             extra = "".join(f"  {figure} {number(both(figure)[0])} / {number(both(figure)[1])}"
                             for figure in ("after 3", "overshoot", "bound") if figure in runs[0])
             verdict = ""
-            if name == "ftcs" and scenario.goal:
+            if name in ("ftcs", "ftcs p2p") and scenario.goal:
                 wrong = []
                 for figure, (median, worst) in scenario.goal.items():
                     if both(figure)[0] > median:
