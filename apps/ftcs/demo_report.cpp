@@ -57,6 +57,7 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
     row["servo"] = servo.servo;
     row["locked"] = servo.locked;
     row["cycles_to_lock"] = servo.cycles_to_lock ? Json(*servo.cycles_to_lock) : Json(nullptr);
+    row["locked_at_sync"] = servo.locked_at_sync ? Json(*servo.locked_at_sync) : Json(nullptr);
     row["lock_band_ns"] = result.lock_band_ns;
     row["excursions"] = servo.excursions;
     row["rms_perceived_offset_ns"] = servo.rms_perceived_offset_ns;

@@ -73,6 +73,7 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   result.servo = setup_.name;
   result.cycles_to_lock = convergence.cycles_to_dwell(ConvergenceOrigin::kFirstAction);
   result.locked = result.cycles_to_lock.has_value();
+  if (result.locked) result.locked_at_sync = *convergence.dwelt + 1;
   result.samples = true_at_samples_.size();
   result.rejected = discipline_.counters().rejected;
   result.true_offsets_ns = true_at_samples_;

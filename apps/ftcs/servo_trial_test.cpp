@@ -61,6 +61,7 @@ TEST(ServoTrial, counts_one_interval_for_ftcs_without_noise) {
   const TrialResult result = world.result(100.0);
   EXPECT_TRUE(result.locked);
   EXPECT_EQ(result.cycles_to_lock, 1U);
+  EXPECT_EQ(result.locked_at_sync, 3U) << "it acted on the second";
   EXPECT_EQ(result.excursions, 0U);
   EXPECT_EQ(result.samples, 40U);
   EXPECT_LT(result.rms_time_error_ns, 1.0);
@@ -73,6 +74,7 @@ TEST(ServoTrial, a_servo_that_never_steers_is_never_locked_however_near_it_start
   const TrialResult result = world.result(1e9);
   EXPECT_FALSE(result.locked);
   EXPECT_FALSE(result.cycles_to_lock.has_value());
+  EXPECT_FALSE(result.locked_at_sync.has_value());
   EXPECT_NEAR(result.final_time_error_ns, 1e6 + 50e-6 * 5e9, 2e3);
 }
 
