@@ -16,6 +16,8 @@ namespace {
 // step.
 constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
 constexpr std::size_t kKeptRefusals = 8;
+// In a row, each after an exchange with somebody else. One is usual when a transmitter comes back.
+constexpr int kSyncsWithoutStamps = 4;
 
 StepPolicy step_policy(const PtpOptions& options) {
   // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
@@ -99,7 +101,7 @@ ClockFollower::ClockFollower(const PtpOptions& options, Log& log, AdjustableCloc
 std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, FreeRunningTime now,
                                                   std::optional<Duration> sync_interval) {
   if (options_.peer_to_peer()) {
-    if (!link_delay_.known() && !shares_timescale()) {
+    if (!link_delay_.known()) {
       waiting_ = emitted;
       return std::nullopt;
     }
@@ -165,6 +167,7 @@ std::optional<std::string> ClockFollower::on_peer_exchange(const EventPair& requ
                                                            const EventPair& response,
                                                            FreeRunningTime now) {
   if (options_.servo.kind != ServoKind::kAdaptive || options_.delay_filter_given) return {};
+  unstamped_exchanges_ = syncs_without_stamps_ = 0;
   timescale_.on_response(response);
   if (!shares_timescale() || !timescale_.checked()) return {};
   for (const EventPair& pair : {request, response}) {
@@ -176,18 +179,27 @@ std::optional<std::string> ClockFollower::on_peer_exchange(const EventPair& requ
 void ClockFollower::follow_timescale(const EventPair& sync) {
   const bool shared = shares_timescale();
   timescale_.on_sync(sync);
-  if (shares_timescale() && !shared) {
+  if (unstamped_exchanges_ > 0) ++syncs_without_stamps_;
+  unstamped_exchanges_ = 0;
+  if (!shared) {
+    if (!shares_timescale()) return;
     start_delay_ = link_delay_.value();
     static_cast<void>(discipline_.free_path_delay());
     log_(LogLevel::kInfo, "{}: the transmitter's peer delay messages measure time too", label_);
-  } else if (shared && !shares_timescale()) {
-    log_(
-        LogLevel::kWarning,
-        "{}: the transmitter's peer delay messages are {:.0f} ns off its Syncs; starting anew with "
-        "the link delay alone",
-        label_, timescale_.difference_ns());
-    discipline_.on_new_reference();
+    return;
   }
+  std::string reason;
+  if (!shares_timescale()) {
+    reason = fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
+                         timescale_.difference_ns());
+  } else if (syncs_without_stamps_ >= kSyncsWithoutStamps) {
+    reason = "the neighbour is not the transmitter any more";
+    timescale_.reset();
+  } else {
+    return;
+  }
+  log_(LogLevel::kWarning, "{}: {}; starting anew with the link delay alone", label_, reason);
+  discipline_.on_new_reference();
 }
 
 // What may pass is one warning for a series; what will not ends the run.
@@ -201,6 +213,7 @@ std::optional<std::string> ClockFollower::on_clock_error(ClockError error) {
 std::optional<std::string> ClockFollower::on_link_delay(Duration mean_link_delay, bool first,
                                                         FreeRunningTime now,
                                                         std::optional<Duration> sync_interval) {
+  ++unstamped_exchanges_;
   if (!link_delay_.add(mean_link_delay, first) || !waiting_) return std::nullopt;
   return on_pair(*std::exchange(waiting_, std::nullopt), now, sync_interval);
 }

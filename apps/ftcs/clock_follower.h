@@ -104,8 +104,10 @@ class ClockFollower {
   StateKeeper state_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
-  SharedTimescale timescale_;  ///< of the neighbour's stamps
-  Duration start_delay_{};     ///< the link's when the servo began to estimate what it differs by
+  SharedTimescale timescale_;    ///< of the neighbour's stamps
+  int unstamped_exchanges_ = 0;  ///< since the last Sync
+  int syncs_without_stamps_ = 0;
+  Duration start_delay_{};  ///< the link's when the servo began to estimate what it differs by
   std::optional<EventPair> waiting_{};  ///< for the first link delay
   SampleSummary recent_;
   SampleSummary since_lock_;

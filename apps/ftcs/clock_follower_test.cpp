@@ -201,6 +201,34 @@ TEST_F(NeighbourIsTransmitter, stamps_that_depart_from_the_syncs_are_dropped_and
   EXPECT_NEAR(error_ns(), 0.0, 1.0);
 }
 
+TEST_F(NeighbourIsTransmitter, a_switch_between_the_two_ends_it_and_the_link_delay_counts) {
+  link_delay(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay);
+  follower->on_new_link();
+  sync(4 * kDelay);
+  EXPECT_NEAR(error_ns(), 0.0, 10.0) << "waits for the new link's delay";
+  for (int i = 0; i < 40; ++i) {  // a transparent clock now answers
+    link_delay(4 * kDelay);
+    sync(4 * kDelay);
+  }
+  EXPECT_NE(logged().find("the neighbour is not the transmitter any more"), std::string::npos);
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+}
+
+TEST_F(NeighbourIsTransmitter, a_transmitter_that_was_silent_for_a_while_goes_on) {
+  link_delay(kDelay);
+  for (int i = 0; i < 100; ++i) cycle(kDelay);
+  for (int i = 0; i < 10; ++i) {  // nobody is followed; the neighbour answers
+    at += kSecond;
+    link_delay(kDelay);
+  }
+  const std::uint64_t before = used();
+  sync(kDelay);
+  for (int i = 0; i < 10; ++i) cycle(kDelay);
+  EXPECT_EQ(used() - before, 1U + 2 * 10U);
+  EXPECT_EQ(logged(), "");
+}
+
 TEST_F(NeighbourIsTransmitter, another_reference_is_compared_anew) {
   link_delay(kDelay);
   for (int i = 0; i < 50; ++i) cycle(kDelay);
