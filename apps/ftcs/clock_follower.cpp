@@ -18,6 +18,10 @@ constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
 constexpr std::size_t kKeptRefusals = 8;
 // In a row, each after an exchange with somebody else. One is usual when a transmitter comes back.
 constexpr int kSyncsWithoutStamps = 4;
+// In units of the noise of one stamp: the mean of a few exchanges is good to half of it, one to
+// 0.7.
+constexpr double kStartDelayDoubt = 3.0;
+constexpr double kAnotherLink = 4.0;
 
 StepPolicy step_policy(const PtpOptions& options) {
   // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
@@ -108,6 +112,7 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
     follow_timescale(emitted);
   }
   discipline_.on_announced_interval(sync_interval.value_or(Duration{}));
+  if (auto wrong = hear_response(emitted.free_running, now)) return wrong;
   const Steered steered = steer(emitted, now);
   if (steered.failure) return steered.failure;
   const Telemetry& telemetry = steered.telemetry;
@@ -133,14 +138,14 @@ std::optional<std::string> ClockFollower::on_pair(const EventPair& emitted, Free
   return failure;
 }
 
-ClockFollower::Steered ClockFollower::steer(EventPair pair, FreeRunningTime now) {
+ClockFollower::Steered ClockFollower::steer(EventPair pair, FreeRunningTime now, bool paces) {
   const bool forward = pair.direction == Direction::kForward;
   const Duration delay = delay_taken_off();
   pair.reference = forward ? pair.reference + delay : pair.reference - delay;
   Steered result;
   result.local = clock_.local_at(pair.free_running);
   Telemetry& telemetry = result.telemetry;
-  telemetry = discipline_.on_pair(pair);
+  telemetry = discipline_.on_pair(pair, paces);
   if (telemetry.error) result.failure = on_clock_error(*telemetry.error);
   clock_refuses_ = telemetry.error.has_value();
   if (!result.failure && telemetry.offset_refused) {
@@ -162,44 +167,61 @@ ClockFollower::Steered ClockFollower::steer(EventPair pair, FreeRunningTime now)
   return result;
 }
 
-// A delay filter that was asked for filters, and is not gone round.
-std::optional<std::string> ClockFollower::on_peer_exchange(const EventPair& request,
-                                                           const EventPair& response,
-                                                           FreeRunningTime now) {
-  if (options_.servo.kind != ServoKind::kAdaptive || options_.delay_filter_given) return {};
+// Syncs and responses are of one direction, and a servo takes those in order. Which of two comes to
+// be known first depends on when their Follow_Ups come.
+std::optional<std::string> ClockFollower::hear_stamps(const ptp::PeerStamps& stamps,
+                                                      FreeRunningTime now) {
   unstamped_exchanges_ = syncs_without_stamps_ = 0;
-  timescale_.on_response(response);
+  timescale_.on_response(stamps.response);
   if (!shares_timescale() || !timescale_.checked()) return {};
-  for (const EventPair& pair : {request, response}) {
-    if (auto wrong = steer(pair, now).failure) return wrong;
-  }
-  return {};
+  if (auto wrong = hear_response(stamps.response.free_running, now)) return wrong;
+  if (stamps.response.free_running > last_sync_) response_ = stamps.response;
+  return steer(stamps.request, now, false).failure;
+}
+
+std::optional<std::string> ClockFollower::hear_response(FreeRunningTime before,
+                                                        FreeRunningTime now) {
+  if (!response_ || before <= response_->free_running) return {};
+  const EventPair response = *std::exchange(response_, std::nullopt);
+  return shares_timescale() ? steer(response, now, false).failure : std::nullopt;
 }
 
 void ClockFollower::follow_timescale(const EventPair& sync) {
   const bool shared = shares_timescale();
   timescale_.on_sync(sync);
-  if (unstamped_exchanges_ > 0) ++syncs_without_stamps_;
-  unstamped_exchanges_ = 0;
+  last_sync_ = sync.free_running;
   if (!shared) {
     if (!shares_timescale()) return;
     start_delay_ = link_delay_.value();
-    static_cast<void>(discipline_.free_path_delay());
+    const double noise_ns = discipline_.latest().servo.timestamp_noise_ns;
+    static_cast<void>(discipline_.free_path_delay(kStartDelayDoubt * noise_ns));
     log_(LogLevel::kInfo, "{}: the transmitter's peer delay messages measure time too", label_);
     return;
   }
-  std::string reason;
+  if (unstamped_exchanges_ > 0) ++syncs_without_stamps_;
+  unstamped_exchanges_ = 0;
   if (!shares_timescale()) {
-    reason = fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
-                         timescale_.difference_ns());
+    start_without_stamps(
+        fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
+                    timescale_.difference_ns()));
   } else if (syncs_without_stamps_ >= kSyncsWithoutStamps) {
-    reason = "the neighbour is not the transmitter any more";
     timescale_.reset();
-  } else {
-    return;
+    start_without_stamps("the neighbour is not the transmitter any more");
   }
-  log_(LogLevel::kWarning, "{}: {}; starting anew with the link delay alone", label_, reason);
+}
+
+void ClockFollower::start_without_stamps(const std::string& why) {
+  log_(LogLevel::kWarning, "{}: {}; starting anew with the link delay", label_, why);
+  response_.reset();
+  unstamped_exchanges_ = syncs_without_stamps_ = 0;
   discipline_.on_new_reference();
+}
+
+// What one exchange says, against what the servo has found.
+bool ClockFollower::is_another_link(Duration mean_link_delay) const {
+  const ServoSnapshot& servo = discipline_.latest().servo;
+  const Duration difference = mean_link_delay - start_delay_ - servo.path_delay;
+  return std::abs(difference.ns()) > kAnotherLink * servo.timestamp_noise_ns;
 }
 
 // What may pass is one warning for a series; what will not ends the run.
@@ -210,27 +232,41 @@ std::optional<std::string> ClockFollower::on_clock_error(ClockError error) {
   return std::nullopt;
 }
 
-std::optional<std::string> ClockFollower::on_link_delay(Duration mean_link_delay, bool first,
+// A delay filter that was asked for filters, and is not gone round.
+std::optional<std::string> ClockFollower::on_link_delay(const ptp::EmitPeerDelay& measured,
                                                         FreeRunningTime now,
                                                         std::optional<Duration> sync_interval) {
-  ++unstamped_exchanges_;
-  if (!link_delay_.add(mean_link_delay, first) || !waiting_) return std::nullopt;
-  return on_pair(*std::exchange(waiting_, std::nullopt), now, sync_interval);
+  if (!link_delay_.add(measured.mean_link_delay, measured.first)) return std::nullopt;
+  if (measured.first && shares_timescale() && is_another_link(measured.mean_link_delay)) {
+    timescale_.reset();
+    start_without_stamps("another link");
+  }
+  if (waiting_) {
+    const EventPair waiting = *std::exchange(waiting_, std::nullopt);
+    if (auto wrong = on_pair(waiting, now, sync_interval)) return wrong;
+  }
+  if (options_.servo.kind != ServoKind::kAdaptive || options_.delay_filter_given) return {};
+  if (measured.stamps) return hear_stamps(*measured.stamps, now);
+  if (shares_timescale()) ++unstamped_exchanges_;
+  return std::nullopt;
 }
 
 void ClockFollower::on_new_link() {
   link_delay_.reset();
   waiting_.reset();
+  response_.reset();
 }
 
 void ClockFollower::on_new_reference() {
   waiting_.reset();
   timescale_.reset();
+  response_.reset();
   discipline_.on_new_reference();
 }
 
 void ClockFollower::on_new_timescale() {
   timescale_.reset();
+  response_.reset();
   discipline_.on_new_timescale();
 }
 

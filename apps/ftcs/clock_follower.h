@@ -13,6 +13,7 @@
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/measurement/link_delay.h"
 #include "ftcs/measurement/shared_timescale.h"
+#include "ftcs/ptp/actions.h"
 
 namespace ftcs::app {
 
@@ -27,17 +28,13 @@ class ClockFollower {
   /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
   [[nodiscard]] std::optional<std::string> on_pair(const EventPair& pair, FreeRunningTime now,
                                                    std::optional<Duration> sync_interval);
-  /// Peer to peer: the delay of the link, measured beside the pairs. Until the first one, nothing
-  /// is steered: the newest pair waits. `first`: of another link. Returns as on_pair() does.
-  [[nodiscard]] std::optional<std::string> on_link_delay(Duration mean_link_delay, bool first,
+  /// Peer to peer: one exchange beside the pairs, first of all the delay of the link. Until there
+  /// is one, nothing is steered: the newest pair waits. With stamps, the neighbour is the
+  /// transmitter: while they show the time of its Syncs the adaptive servo hears them too and
+  /// estimates the path delay itself (decision 0015). Returns as on_pair() does.
+  [[nodiscard]] std::optional<std::string> on_link_delay(const ptp::EmitPeerDelay& measured,
                                                          FreeRunningTime now,
                                                          std::optional<Duration> sync_interval);
-  /// Peer to peer: the stamps of such an exchange, where the neighbour is the transmitter. While
-  /// they show the time of its Syncs, the adaptive servo hears them too and estimates the path
-  /// delay itself (decision 0015). Returns as on_pair() does.
-  [[nodiscard]] std::optional<std::string> on_peer_exchange(const EventPair& request,
-                                                            const EventPair& response,
-                                                            FreeRunningTime now);
   /// Another link: its delay is not known yet.
   void on_new_link();
   /// Once per turn of the loop.
@@ -80,8 +77,14 @@ class ClockFollower {
     Duration perceived{};                  ///< offset; of a forward message
     std::optional<std::string> failure{};  ///< why the run must end
   };
-  [[nodiscard]] Steered steer(EventPair pair, FreeRunningTime now);
+  [[nodiscard]] Steered steer(EventPair pair, FreeRunningTime now, bool paces = true);
+  [[nodiscard]] std::optional<std::string> hear_stamps(const ptp::PeerStamps& stamps,
+                                                       FreeRunningTime now);
+  [[nodiscard]] std::optional<std::string> hear_response(FreeRunningTime before,
+                                                         FreeRunningTime now);
   void follow_timescale(const EventPair& sync);
+  void start_without_stamps(const std::string& why);
+  [[nodiscard]] bool is_another_link(Duration mean_link_delay) const;
   [[nodiscard]] bool shares_timescale() const {
     return timescale_.verdict() == SharedTimescale::Verdict::kShared;
   }
@@ -104,7 +107,10 @@ class ClockFollower {
   StateKeeper state_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
-  SharedTimescale timescale_;    ///< of the neighbour's stamps
+  SharedTimescale timescale_;  ///< of the neighbour's stamps
+  /// Heard with the next Sync: of the two the one whose event came first.
+  std::optional<EventPair> response_{};
+  FreeRunningTime last_sync_{};
   int unstamped_exchanges_ = 0;  ///< since the last Sync
   int syncs_without_stamps_ = 0;
   Duration start_delay_{};  ///< the link's when the servo began to estimate what it differs by

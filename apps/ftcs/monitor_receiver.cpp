@@ -118,9 +118,10 @@ void MonitorReceiver::on_port_data(const ptp::PortDataSet& port, FreeRunningTime
   const bool receives =
       port.state == ptp::PortState::kTimeReceiver || port.state == ptp::PortState::kUncalibrated;
   if (!receives || port.mean_link_delay <= Duration{}) return;  // none yet
-  const auto wrong =
-      follower_.on_link_delay(port.mean_link_delay, false, now, source_.sync_interval());
-  if (wrong) fail(*wrong);
+  const ptp::EmitPeerDelay measured{port.mean_link_delay, {}, false, {}};
+  if (const auto wrong = follower_.on_link_delay(measured, now, source_.sync_interval())) {
+    fail(*wrong);
+  }
 }
 
 void MonitorReceiver::read_reports() {

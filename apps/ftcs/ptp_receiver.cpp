@@ -56,14 +56,10 @@ void PtpReceiver::act(const ptp::Action& action) {
   if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) {
     on_pair(emitted->pair);
   } else if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
-    if (const auto wrong = follower_.on_link_delay(delay->mean_link_delay, delay->first, now(),
-                                                   core().sync_interval())) {
+    follow_scale_change();
+    if (const auto wrong = follower_.on_link_delay(*delay, now(), core().sync_interval())) {
       return fail(*wrong);
     }
-    if (!delay->stamps) return;
-    follow_scale_change();
-    const auto& [request, response] = *delay->stamps;
-    if (const auto wrong = follower_.on_peer_exchange(request, response, now())) fail(*wrong);
   } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
     if (change->to == ptp::PortState::kFaulty) follower_.on_new_link();
   } else if (const auto* seen = std::get_if<ptp::TransmitterSeen>(&action)) {

@@ -30,7 +30,8 @@ struct TrialResult {
   /// Control intervals after the servo's first action until |true offset| stays inside the band for
   /// kLockDwell samples; absent if that never came.
   std::optional<std::uint64_t> cycles_to_lock;
-  /// The first Sync of those samples, from 1: one origin for all servos, whenever each began to act.
+  /// The first Sync of those samples, from 1: one origin for all servos, whenever each began to
+  /// act.
   std::optional<std::uint64_t> locked_at_sync;
   std::uint64_t excursions = 0;  ///< times the true offset left the band after that
   double rms_perceived_offset_ns =

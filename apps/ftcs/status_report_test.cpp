@@ -86,7 +86,7 @@ TEST(StatusReport, PeerToPeerThePathDelayIsThatOfTheLink) {
   VirtualClock clock(source, {});
   ClockFollower follower(options, log, clock, source.now(), false, "port 1 (eth0)");
   const Duration link = Duration::from_whole_ns(1500);
-  EXPECT_FALSE(follower.on_link_delay(link, true, source.now(), std::nullopt));
+  EXPECT_FALSE(follower.on_link_delay({link, {}, true, {}}, source.now(), std::nullopt));
   for (int i = 1; i < 10; ++i) {
     const std::int64_t sent = i * std::int64_t{125'000'000};
     source.instant = FreeRunningTime::from_ns(sent) + link;

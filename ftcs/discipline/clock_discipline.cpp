@@ -46,7 +46,7 @@ std::optional<ClockError> ClockDiscipline::start_at(Rate rate) noexcept {
   return std::nullopt;
 }
 
-Telemetry ClockDiscipline::on_pair(const EventPair& event) noexcept {
+Telemetry ClockDiscipline::on_pair(const EventPair& event, bool paces) noexcept {
   const ClockReading now = clock_.read();
   begin(now);
   const TimestampPair pair{event.direction, event.reference, clock_.local_at(event.free_running),
@@ -55,8 +55,13 @@ Telemetry ClockDiscipline::on_pair(const EventPair& event) noexcept {
   telemetry_.direction = event.direction;
   telemetry_.verdict = update.verdict;
   telemetry_.servo = servo_.snapshot();
-  count(event.direction, update.verdict);
-  if (update.verdict == SampleVerdict::kUsed && event.direction == Direction::kForward) {
+  const bool used = update.verdict == SampleVerdict::kUsed;
+  if (used && !paces) {
+    ++counters_.beside;
+  } else {
+    count(event.direction, update.verdict);
+  }
+  if (used && paces && event.direction == Direction::kForward) {
     note_sample(event);
     if (telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
   }

@@ -40,16 +40,21 @@ class ClockDiscipline {
 
   /// Before the first message: from now on at this rate, which somebody knows already.
   [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept;
-  Telemetry on_pair(const EventPair& pair) noexcept;
+  /// `paces`: such pairs come once a Sync interval; the forward ones are the samples, make the
+  /// lock, and are missed when they stay away. Others are heard and no more.
+  Telemetry on_pair(const EventPair& pair, bool paces = true) noexcept;
   /// To be called when nothing has come for a while, as often as liked: samples missing for
   /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking rate.
   Telemetry on_silence() noexcept;
   /// What the time transmitter says of its Sync interval; zero: nothing. Messages that come in a
   /// burst are then not taken for a shorter one.
   void on_announced_interval(Duration interval) noexcept { announced_interval_ = interval; }
-  /// From now on the path delay is estimated from messages of both directions, whatever the
-  /// configuration says; until the next reference. False if the servo cannot.
-  [[nodiscard]] bool free_path_delay() noexcept { return servo_.free_path_delay(); }
+  /// From now on the path delay is estimated from messages of both directions, beginning at what
+  /// the configuration says, give or take `sigma_ns`; until the next reference. False if the servo
+  /// cannot.
+  [[nodiscard]] bool free_path_delay(double sigma_ns) noexcept {
+    return servo_.free_path_delay(sigma_ns);
+  }
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:

@@ -13,6 +13,7 @@ namespace ftcs {
 struct DisciplineCounters {
   std::uint64_t used = 0;         ///< forward messages that were not turned away
   std::uint64_t backward = 0;     ///< backward messages that were plausible
+  std::uint64_t beside = 0;       ///< heard beside those that pace
   std::uint64_t rejected = 0;     ///< outliers
   std::uint64_t duplicate = 0;    ///< repeated or late
   std::uint64_t implausible = 0;  ///< time went backward, absurd delay or interval

@@ -32,17 +32,20 @@ class SharedTimescale {
 
   /// A Sync, whose direction is forward.
   void on_sync(const EventPair& sync) noexcept {
-    if (has_sync_ && has_response_) compare(sync);
+    previous_ = sync_;
     sync_ = sync;
-    has_sync_ = true;
-    has_response_ = false;
-    unchecked_ = 0;
+    syncs_ = std::min(syncs_ + 1, 2);
+    compare();
   }
-  /// Another message from the same port, forward too. The last one before a Sync is compared.
+  /// Another message from the same port, forward too. The first one after a Sync is compared; it
+  /// may be told before that Sync, or after the next.
   void on_response(const EventPair& response) noexcept {
-    response_ = response;
-    has_response_ = true;
+    if (syncs_ > 0 && !has_response_) {
+      response_ = response;
+      has_response_ = true;
+    }
     unchecked_ = std::min(unchecked_ + 1, kUncheckedLimit);
+    compare();
   }
   void reset() noexcept { *this = SharedTimescale{}; }
   [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
@@ -53,20 +56,24 @@ class SharedTimescale {
 
  private:
   static constexpr int kUncheckedLimit = 16;
-  /// Of a median of normal values over that of their mean, and of a MAD; stamps are whole ns.
+  /// Of a median of normal values over that of their mean, and of a MAD. Many clocks advance by 8
+  /// ns; where the phase of two stands still, rounding is no noise.
   static constexpr double kMedianError = 1.2533;
   static constexpr double kMadToSigma = 1.4826;
-  static constexpr double kLeastMadNs = 1.0;
+  static constexpr double kLeastMadNs = 8.0;
   static constexpr double kSharedBelow = 3.0;
   /// A false alarm costs a new start: with 64 values the MAD itself may be a third too small.
   static constexpr double kForeignAbove = 8.0;
 
-  void compare(const EventPair& sync) noexcept {
-    const double span = (sync.free_running - sync_.free_running).ns();
-    const double ahead = (response_.free_running - sync_.free_running).ns();
-    if (!(ahead >= 0.0 && ahead < span)) return;
-    const double by_sync = (sync.reference - sync_.reference).ns() * (ahead / span);
-    differences_[next_] = (response_.reference - sync_.reference).ns() - by_sync;
+  void compare() noexcept {
+    const double span = (sync_.free_running - previous_.free_running).ns();
+    const double ahead = (response_.free_running - previous_.free_running).ns();
+    if (!has_response_ || syncs_ < 2 || ahead >= span) return;  // until the next Sync
+    has_response_ = false;
+    if (ahead < 0.0) return;
+    unchecked_ = 0;
+    const double by_sync = (sync_.reference - previous_.reference).ns() * (ahead / span);
+    differences_[next_] = (response_.reference - previous_.reference).ns() - by_sync;
     next_ = (next_ + 1) % kWindow;
     size_ = std::min(size_ + 1, kWindow);
     judge();
@@ -91,9 +98,10 @@ class SharedTimescale {
     return low + (high - low) / 2.0;
   }
 
+  EventPair previous_{};
   EventPair sync_{};
   EventPair response_{};
-  bool has_sync_ = false;
+  int syncs_ = 0;
   bool has_response_ = false;
   int unchecked_ = 0;
   Verdict verdict_ = Verdict::kOpen;

@@ -106,10 +106,24 @@ TEST_F(SharedTimescaleTest, without_syncs_nothing_says_so_any_more) {
 TEST_F(SharedTimescaleTest, compares_only_what_came_between_two_syncs) {
   watch.on_sync(pair(1.0, 0.0));
   for (int i = 0; i < 10; ++i) {
-    watch.on_response(pair(1.5 + i - 1.0, 0.0));  // older than the last Sync
+    watch.on_response(pair(1.5 + i - 2.0, 0.0));  // older than the Sync before the last
     watch.on_sync(pair(2.0 + i, 0.0));
   }
   EXPECT_EQ(watch.verdict(), Verdict::kOpen);
+}
+
+TEST_F(SharedTimescaleTest, a_response_may_be_told_after_the_next_sync_or_before_an_older_one) {
+  for (int i = 0; i < 10; ++i) {
+    watch.on_sync(pair(1.0 + i, 0.0));
+    watch.on_response(pair(0.5 + i, 0.0));
+  }
+  EXPECT_EQ(watch.verdict(), Verdict::kShared);
+  watch.reset();
+  for (int i = 0; i < 10; ++i) {
+    watch.on_response(pair(1.1 + i, 0.0));
+    watch.on_sync(pair(1.0 + i, 0.0));
+  }
+  EXPECT_EQ(watch.verdict(), Verdict::kShared);
 }
 
 TEST_F(SharedTimescaleTest, does_not_allocate) {

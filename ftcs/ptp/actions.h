@@ -56,8 +56,8 @@ struct EmitPeerDelay {
   Duration mean_link_delay{};  ///< without asymmetry, by the reference, else the neighbour
   Rate neighbor_rate_ratio;    ///< of the neighbour's clock in units of ours; 1 until known
   bool first = false;          ///< the first one of this link: what was measured before is void
-  /// Where the neighbour is the followed transmitter and has told both stamps: its clock shows what
-  /// it transmits, and the exchange measures time, as Delay_Req and Sync do.
+  /// Where the neighbour is the followed transmitter and has told both stamps: if they are of the
+  /// timescale of its Syncs, the exchange measures time, as Delay_Req and Sync do.
   std::optional<PeerStamps> stamps{};
 };
 

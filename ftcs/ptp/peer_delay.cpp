@@ -261,7 +261,12 @@ std::optional<PeerStamps> PeerDelay::stamps() const noexcept {
   // A one-step answer tells the turn-around alone, and so may a two-step one: both stamps are zero.
   const bool told = exchange.two_step && exchange.request_receipt != ReferenceTime{} &&
                     exchange.response_origin != ReferenceTime{};
-  if (!told || transmitter_ != exchange.responder) return std::nullopt;
+  // A fraction of a nanosecond belongs to the stamp. More was added on the way, and the two fields
+  // do not tell which of the messages it held up.
+  const Duration fraction{Nanoseconds{1}};
+  const bool direct =
+      abs(exchange.correction) < fraction && abs(exchange.follow_up_correction) < fraction;
+  if (!told || !direct || transmitter_ != exchange.responder) return std::nullopt;
   const ReferenceTime t2 = exchange.request_receipt - exchange.correction + config_.asymmetry;
   const ReferenceTime t3 =
       exchange.response_origin + exchange.follow_up_correction + config_.asymmetry;

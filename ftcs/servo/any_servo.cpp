@@ -118,9 +118,9 @@ void AnyServo::on_step(Duration step) noexcept {
       servo_);
 }
 
-bool AnyServo::free_path_delay() noexcept {
+bool AnyServo::free_path_delay(double sigma_ns) noexcept {
   auto* const adaptive = std::get_if<AdaptiveServo>(&servo_);
-  if (adaptive != nullptr) adaptive->free_path_delay();
+  if (adaptive != nullptr) adaptive->free_path_delay(sigma_ns);
   return adaptive != nullptr;
 }
 

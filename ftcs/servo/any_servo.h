@@ -96,7 +96,7 @@ class AnyServo {
   /// know.
   void on_step(Duration step) noexcept;
   /// AdaptiveServo::free_path_delay(); false if this servo cannot.
-  [[nodiscard]] bool free_path_delay() noexcept;
+  [[nodiscard]] bool free_path_delay(double sigma_ns) noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;
   /// As of `now`, for a servo whose belief ages (holdover); otherwise as of the last message.
   [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;

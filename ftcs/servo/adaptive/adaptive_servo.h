@@ -41,9 +41,9 @@ class BasicAdaptiveServo {
 
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept;
-  /// fixed_path_delay was a start: until the next reset() the path delay is estimated, from
-  /// messages of both directions.
-  void free_path_delay() noexcept { estimator_.free_delay(); }
+  /// fixed_path_delay was a start, good to `sigma_ns`: until the next reset() the path delay is
+  /// estimated, from messages of both directions.
+  void free_path_delay(double sigma_ns) noexcept { estimator_.free_delay(sigma_ns); }
   /// As of the last message after which the servo steered.
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return describe(latest_, state_); }
   /// As of `now`: the offset that the clock has by the servo's belief, and how far that belief can

@@ -117,7 +117,7 @@ TEST(AdaptiveServo, a_path_delay_that_was_given_may_be_set_free) {
   config.fixed_path_delay = Nanoseconds{10'000};
   AdaptiveServo servo{config};
   EXPECT_NEAR(follow(servo, 0, 100).path_delay.ns(), 10'000.0, 0.01);
-  servo.free_path_delay();
+  servo.free_path_delay(1'000.0);
   const ServoSnapshot free = follow(servo, 100, 300);
   EXPECT_NEAR(free.path_delay.ns(), 11'000.0, 1.0);
   EXPECT_NEAR(free.offset.ns(), 0.0, 1.0);

@@ -112,13 +112,27 @@ template <class Grid>
 void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
-  if (known_delay().known()) return;
-  const double first_sign = -sign_of(side);
-  bank_.for_each([first_sign](Estimate& e) {
-    e.xx += kDelayPrior;
-    e.xd -= first_sign * kDelayPrior;
-    e.dd += kDelayPrior;
+  const bool free_already = bank_.estimate(best_).dd > 0.0;  // free_delay()
+  if (!known_delay().known() && !free_already) unpin_delay(-sign_of(side), kDelayPrior);
+}
+
+template <class Grid>
+void Estimator<Grid>::unpin_delay(double first_sign, double variance) noexcept {
+  bank_.for_each([=](Estimate& e) {
+    e.xx += variance;
+    e.xd -= first_sign * variance;
+    e.dd += variance;
   });
+}
+
+/// With so much doubt a first message that is late by more is an outlier; with none at all it would
+/// be believed.
+template <class Grid>
+void Estimator<Grid>::free_delay(double sigma_ns) noexcept {
+  delay_freed_ = true;
+  if (count_ == 0 || two_way()) return;
+  const double sigma = std::max(sigma_ns, least_noise_) / scale_;
+  unpin_delay(seen_[0] ? 1.0 : -1.0, sigma * sigma);
 }
 
 template <class Grid>

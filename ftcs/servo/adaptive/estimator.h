@@ -50,8 +50,9 @@ class Estimator {
   /// No noise is smaller than this, ns: what rounds the timestamps makes some.
   void expect_noise_of_at_least(double noise_ns) noexcept { least_noise_ = noise_ns; }
 
-  /// The delay that was known is estimated from now on: messages of the other direction will come.
-  void free_delay() noexcept { delay_freed_ = true; }
+  /// The delay that was known is estimated from now on, from what it was, give or take sigma_ns:
+  /// messages of the other direction will come.
+  void free_delay(double sigma_ns) noexcept;
   /// It is known again. Before the first message only.
   void fix_delay() noexcept { delay_freed_ = false; }
 
@@ -91,6 +92,7 @@ class Estimator {
   double step(const Observation& seen) noexcept;
   void begin(std::size_t side) noexcept;
   void connect_second_direction(std::size_t side) noexcept;
+  void unpin_delay(double first_sign, double variance) noexcept;
   void detect_changes(const Row& log_density) noexcept;
   [[nodiscard]] bool follow_gate(std::size_t side, double credit, double innovation) noexcept;
   void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
