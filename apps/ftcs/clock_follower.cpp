@@ -187,11 +187,19 @@ std::optional<std::string> ClockFollower::hear_response(FreeRunningTime before,
 }
 
 void ClockFollower::follow_timescale(const EventPair& sync) {
-  const bool shared = shares_timescale();
+  using Verdict = SharedTimescale::Verdict;
+  const Verdict before = timescale_.verdict();
   timescale_.on_sync(sync);
   last_sync_ = sync.free_running;
-  if (!shared) {
-    if (!shares_timescale()) return;
+  const bool decided = timescale_.verdict() != before;
+  if (before != Verdict::kShared) {
+    if (decided && !shares_timescale()) {
+      log_(LogLevel::kInfo,
+           "{}: the transmitter's peer delay messages are {:.0f} ns off its Syncs; the link delay "
+           "alone counts",
+           label_, timescale_.difference_ns());
+    }
+    if (!decided || !shares_timescale()) return;
     start_delay_ = link_delay_.value();
     const double noise_ns = discipline_.latest().servo.timestamp_noise_ns;
     static_cast<void>(discipline_.free_path_delay(kStartDelayDoubt * noise_ns));
