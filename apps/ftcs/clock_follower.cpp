@@ -175,7 +175,7 @@ std::optional<std::string> ClockFollower::hear_stamps(const ptp::PeerStamps& sta
   timescale_.on_response(stamps.response);
   if (!shares_timescale() || !timescale_.checked()) return {};
   if (auto wrong = hear_response(stamps.response.free_running, now)) return wrong;
-  if (stamps.response.free_running > last_sync_) response_ = stamps.response;
+  if (stamps.response.free_running > timescale_.last_sync()) response_ = stamps.response;
   return steer(stamps.request, now, false).failure;
 }
 
@@ -187,42 +187,40 @@ std::optional<std::string> ClockFollower::hear_response(FreeRunningTime before,
 }
 
 void ClockFollower::follow_timescale(const EventPair& sync) {
-  using Verdict = SharedTimescale::Verdict;
-  const Verdict before = timescale_.verdict();
+  const SharedTimescale::Verdict before = timescale_.verdict();
   timescale_.on_sync(sync);
-  last_sync_ = sync.free_running;
-  const bool decided = timescale_.verdict() != before;
-  if (before != Verdict::kShared) {
-    if (decided && !shares_timescale()) {
-      log_(LogLevel::kInfo,
-           "{}: the transmitter's peer delay messages are {:.0f} ns off its Syncs; the link delay "
-           "alone counts",
-           label_, timescale_.difference_ns());
-    }
-    if (!decided || !shares_timescale()) return;
+  if (timescale_.verdict() != before) return follow_verdict(before);
+  if (!shares_timescale()) return;
+  if (unstamped_exchanges_ > 0) ++syncs_without_stamps_;
+  unstamped_exchanges_ = 0;
+  if (syncs_without_stamps_ < kSyncsWithoutStamps) return;
+  forget_stamps();
+  start_with_link_delay("the neighbour is not the transmitter any more");
+}
+
+void ClockFollower::follow_verdict(SharedTimescale::Verdict before) {
+  if (shares_timescale()) {
     start_delay_ = link_delay_.value();
-    const double noise_ns = discipline_.latest().servo.timestamp_noise_ns;
-    static_cast<void>(discipline_.free_path_delay(kStartDelayDoubt * noise_ns));
+    discipline_.free_path_delay(kStartDelayDoubt * discipline_.latest().servo.timestamp_noise_ns);
     log_(LogLevel::kInfo, "{}: the transmitter's peer delay messages measure time too", label_);
     return;
   }
-  if (unstamped_exchanges_ > 0) ++syncs_without_stamps_;
-  unstamped_exchanges_ = 0;
-  if (!shares_timescale()) {
-    start_without_stamps(
-        fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
-                    timescale_.difference_ns()));
-  } else if (syncs_without_stamps_ >= kSyncsWithoutStamps) {
-    timescale_.reset();
-    start_without_stamps("the neighbour is not the transmitter any more");
-  }
+  const std::string why =
+      fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
+                  timescale_.difference_ns());
+  if (before == SharedTimescale::Verdict::kShared) return start_with_link_delay(why);
+  log_(LogLevel::kInfo, "{}: {}; the link delay alone counts", label_, why);
 }
 
-void ClockFollower::start_without_stamps(const std::string& why) {
+void ClockFollower::start_with_link_delay(const std::string& why) {
   log_(LogLevel::kWarning, "{}: {}; starting anew with the link delay", label_, why);
+  discipline_.on_new_reference();
+}
+
+void ClockFollower::forget_stamps() {
+  timescale_.reset();
   response_.reset();
   unstamped_exchanges_ = syncs_without_stamps_ = 0;
-  discipline_.on_new_reference();
 }
 
 // What one exchange says, against what the servo has found.
@@ -246,8 +244,8 @@ std::optional<std::string> ClockFollower::on_link_delay(const ptp::EmitPeerDelay
                                                         std::optional<Duration> sync_interval) {
   if (!link_delay_.add(measured.mean_link_delay, measured.first)) return std::nullopt;
   if (measured.first && shares_timescale() && is_another_link(measured.mean_link_delay)) {
-    timescale_.reset();
-    start_without_stamps("another link");
+    forget_stamps();
+    start_with_link_delay("another link");
   }
   if (waiting_) {
     const EventPair waiting = *std::exchange(waiting_, std::nullopt);
@@ -267,14 +265,12 @@ void ClockFollower::on_new_link() {
 
 void ClockFollower::on_new_reference() {
   waiting_.reset();
-  timescale_.reset();
-  response_.reset();
+  forget_stamps();
   discipline_.on_new_reference();
 }
 
 void ClockFollower::on_new_timescale() {
-  timescale_.reset();
-  response_.reset();
+  forget_stamps();
   discipline_.on_new_timescale();
 }
 

@@ -83,7 +83,9 @@ class ClockFollower {
   [[nodiscard]] std::optional<std::string> hear_response(FreeRunningTime before,
                                                          FreeRunningTime now);
   void follow_timescale(const EventPair& sync);
-  void start_without_stamps(const std::string& why);
+  void follow_verdict(SharedTimescale::Verdict before);
+  void start_with_link_delay(const std::string& why);
+  void forget_stamps();
   [[nodiscard]] bool is_another_link(Duration mean_link_delay) const;
   [[nodiscard]] bool shares_timescale() const {
     return timescale_.verdict() == SharedTimescale::Verdict::kShared;
@@ -110,7 +112,6 @@ class ClockFollower {
   SharedTimescale timescale_;  ///< of the neighbour's stamps
   /// Heard with the next Sync: of the two the one whose event came first.
   std::optional<EventPair> response_{};
-  FreeRunningTime last_sync_{};
   int unstamped_exchanges_ = 0;  ///< since the last Sync
   int syncs_without_stamps_ = 0;
   Duration start_delay_{};  ///< the link's when the servo began to estimate what it differs by

@@ -50,11 +50,9 @@ class ClockDiscipline {
   /// burst are then not taken for a shorter one.
   void on_announced_interval(Duration interval) noexcept { announced_interval_ = interval; }
   /// From now on the path delay is estimated from messages of both directions, beginning at what
-  /// the configuration says, give or take `sigma_ns`; until the next reference. False if the servo
-  /// cannot.
-  [[nodiscard]] bool free_path_delay(double sigma_ns) noexcept {
-    return servo_.free_path_delay(sigma_ns);
-  }
+  /// the configuration says, give or take `sigma_ns`; until the next reference. Nothing happens
+  /// where the servo cannot.
+  void free_path_delay(double sigma_ns) noexcept { servo_.free_path_delay(sigma_ns); }
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:

@@ -6,6 +6,10 @@
 
 namespace ftcs {
 
+/// Standard deviation of a normal distribution in units of its median absolute deviation:
+/// 1 / (quantile of 0.75).
+inline constexpr double kMadToSigma = 1.4826;
+
 /// The value that stood at `wanted`, were the first `size` of `values` sorted (Hoare's FIND, Comm.
 /// ACM 4, 1961); they are reordered. In place of std::nth_element, which calls memmove: the cycle
 /// servo's C library has but memcpy and memset. Valid: 0 <= wanted < size.

@@ -7,13 +7,6 @@
 #include "ftcs/measurement/order_statistic.h"
 
 namespace ftcs {
-namespace {
-
-/// Standard deviation of a normal distribution in units of its median absolute deviation.
-constexpr double kSigmaPerMad = 1.4826;
-
-}  // namespace
-
 GateDecision OutlierGate::decide(Duration innovation) noexcept {
   const double innovation_ns = innovation.ns();
   const bool was_warm = warm();
@@ -54,7 +47,7 @@ double OutlierGate::spread_about(double centre) const noexcept {
   std::transform(innovations_.begin(), innovations_.end(), deviations.begin(),
                  [centre](double value) { return std::abs(value - centre); });
   const auto resolution_ns = static_cast<double>(config_.resolution.count());
-  return std::max(kSigmaPerMad * median_of(deviations), resolution_ns);
+  return std::max(kMadToSigma * median_of(deviations), resolution_ns);
 }
 
 void OutlierGate::reset() noexcept {

@@ -19,7 +19,8 @@ namespace ftcs {
 ///     D = response - Sync, both reference minus free-running, Sync interpolated to the response.
 ///
 /// One path, so D is noise of mean zero if the time is one. Judged is the median of the last
-/// differences against its standard error by their median absolute deviation; no limit in ns.
+/// differences against its standard error by their median absolute deviation; no limit in ns, but
+/// for the resolution of stamps.
 class SharedTimescale {
  public:
   enum class Verdict : std::uint8_t {
@@ -49,6 +50,8 @@ class SharedTimescale {
   }
   void reset() noexcept { *this = SharedTimescale{}; }
   [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
+  /// When the last Sync came; before the first one the zero of time.
+  [[nodiscard]] FreeRunningTime last_sync() const noexcept { return sync_.free_running; }
   /// Syncs still come: without them nothing says that the time is one.
   [[nodiscard]] bool checked() const noexcept { return unchecked_ < kUncheckedLimit; }
   /// Median of the last differences, ns: the time that the responses show is later by this.
@@ -56,10 +59,9 @@ class SharedTimescale {
 
  private:
   static constexpr int kUncheckedLimit = 16;
-  /// Of a median of normal values over that of their mean, and of a MAD. Many clocks advance by 8
-  /// ns; where the phase of two stands still, rounding is no noise.
+  /// Standard error of the median of normal values over that of their mean.
   static constexpr double kMedianError = 1.2533;
-  static constexpr double kMadToSigma = 1.4826;
+  /// Many clocks advance by 8 ns; where the phase of two stands still, rounding is no noise.
   static constexpr double kLeastMadNs = 8.0;
   static constexpr double kSharedBelow = 3.0;
   /// A false alarm costs a new start: with 64 values the MAD itself may be a third too small.

@@ -118,10 +118,14 @@ void AnyServo::on_step(Duration step) noexcept {
       servo_);
 }
 
-bool AnyServo::free_path_delay(double sigma_ns) noexcept {
-  auto* const adaptive = std::get_if<AdaptiveServo>(&servo_);
-  if (adaptive != nullptr) adaptive->free_path_delay(sigma_ns);
-  return adaptive != nullptr;
+void AnyServo::free_path_delay(double sigma_ns) noexcept {
+  std::visit(
+      [sigma_ns](auto& servo) noexcept {
+        if constexpr (requires { servo.free_path_delay(sigma_ns); }) {
+          servo.free_path_delay(sigma_ns);
+        }
+      },
+      servo_);
 }
 
 ServoSnapshot AnyServo::snapshot() const noexcept {

@@ -95,8 +95,8 @@ class AnyServo {
   /// The clock has been stepped by somebody else; a servo that lives in free-running time need not
   /// know.
   void on_step(Duration step) noexcept;
-  /// AdaptiveServo::free_path_delay(); false if this servo cannot.
-  [[nodiscard]] bool free_path_delay(double sigma_ns) noexcept;
+  /// AdaptiveServo::free_path_delay(); nothing where the servo has none.
+  void free_path_delay(double sigma_ns) noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;
   /// As of `now`, for a servo whose belief ages (holdover); otherwise as of the last message.
   [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <new>
 
+#include "ftcs/measurement/order_statistic.h"
+
 namespace ftcs::adaptive {
 namespace {
 

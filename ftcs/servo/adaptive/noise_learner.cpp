@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/measurement/order_statistic.h"
 #include "ftcs/servo/adaptive/quick_math.h"
 
 namespace ftcs::adaptive {

@@ -77,8 +77,4 @@ class SortedWindow {
   std::uint8_t next_ = 0;
 };
 
-/// Median of the absolute values of a normal distribution times this is its standard deviation:
-/// 1 / (quantile of 0.75).
-inline constexpr double kMadToSigma = 1.4826;
-
 }  // namespace ftcs::adaptive
