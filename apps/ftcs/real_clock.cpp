@@ -35,7 +35,12 @@ std::string describe(const std::string& clock, ClockError error) {
 }
 
 RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc)
-    : kernel_(kernel), log_(log), clock_(std::move(clock)), timer_(kernel), utc_(std::move(utc)) {}
+    : kernel_(kernel),
+      log_(log),
+      clock_(std::move(clock)),
+      timer_(kernel),
+      utc_(std::move(utc)),
+      good_rate_(clock_.tracking_rate()) {}
 
 void RealClock::before_wait(std::optional<std::int64_t> at_most_ns) {
   (void)clock_.read();  // what is left of a correction counts from now
@@ -87,6 +92,7 @@ void RealClock::follow_scale() {
 std::optional<std::string> RealClock::attend(bool steering, bool locked,
                                              const ServoSnapshot& servo) {
   if (const auto error = clock_.failure()) return describe(name(), *error);
+  if (locked) good_rate_ = clock_.tracking_rate();
   const std::int64_t raw_s = kernel_.clock_ns(CLOCK_MONOTONIC_RAW) / kNsPerSecond;
   if (raw_s == attended_raw_s_) return std::nullopt;
   attended_raw_s_ = raw_s;
@@ -206,7 +212,11 @@ void RealClock::publish(bool locked, const ServoSnapshot& servo) {
 }
 
 void RealClock::stop() {
-  clock_.settle();
+  if (clock_.is_steered() && clock_.tracking_rate() != good_rate_) {
+    log_(LogLevel::kNotice, "{}: not locked: leaving a rate of {:+.3f} ppb, the last good one",
+         name(), good_rate_.ppb());
+  }
+  clock_.settle_at(good_rate_);
   if (clock_.expiry() && !clock_.failure()) {
     log_(LogLevel::kError, "{}: the kernel refuses to end a correction; its rate is off", name());
   }

@@ -59,7 +59,8 @@ class RealClock {
   /// been applied, so that the clock is ours to describe.
   [[nodiscard]] std::optional<std::string> attend(bool steering, bool locked,
                                                   const ServoSnapshot& servo);
-  /// Before the program ends: the clock keeps its last good rate.
+  /// Before the program ends: leaves the last rate that was set while the servo was locked, or else
+  /// the one from before the first command.
   void stop();
 
  private:
@@ -86,6 +87,7 @@ class RealClock {
   std::int64_t no_leap_before_s_ = 0;  ///< UTC
   int last_leap_ = 0;                  ///< the one that no_leap_before_s_ belongs to
   std::int64_t attended_raw_s_ = -1;
+  Rate good_rate_;
   bool publish_failed_ = false;
   bool expiry_said_ = false;
 };

@@ -59,6 +59,27 @@ class RealClockTest : public testing::Test {
   bool leapt = false;
 };
 
+TEST_F(RealClockTest, leaves_a_rate_behind_that_was_set_while_the_servo_was_locked) {
+  struct Case {
+    bool was_locked;
+    double expected_ppm;
+  };
+  for (const auto& [was_locked, expected_ppm] : {Case{true, 20.0}, Case{false, 7.0}}) {
+    kernel.system.freq = 7 * 65'536;
+    kernel.held_names.clear();
+    start(kNewYear2024);
+    const auto command = [&](double ppm, bool locked) {
+      const Rate rate = Rate::from_ppm(ppm);
+      ASSERT_TRUE(real->clock().apply({rate, Duration{}, rate, Duration{}}).ok());
+      EXPECT_FALSE(real->attend(true, locked, {}).has_value());
+    };
+    command(20.0, was_locked);
+    command(6'027.0, false);
+    real->stop();
+    EXPECT_NEAR(kernel.system.steering(), 1.0 + expected_ppm * 1e-6, 2e-11);
+  }
+}
+
 TEST_F(RealClockTest, local_time_is_tai_by_the_offset_of_the_reference) {
   start(kNewYear2024);
   real->set_reference_scale({.tai = true, .utc_offset = 37});

@@ -38,7 +38,12 @@ class ClockDevice {
     std::int64_t raw_ns = 0;
     std::int64_t width_ns = 0;  ///< the true raw time lies within ± width/2
   };
+  /// The quickest of several: whoever is preempted in the middle of one reads again.
   [[nodiscard]] Result<Reading, ClockError> read() noexcept;
+  /// The narrowest reading so far.
+  [[nodiscard]] std::int64_t quickest_ns() const noexcept { return quickest_ns_; }
+  /// CLOCK_MONOTONIC_RAW alone.
+  [[nodiscard]] std::int64_t read_raw() noexcept { return kernel_->clock_ns(CLOCK_MONOTONIC_RAW); }
   /// The clock alone; no value: the device is gone.
   [[nodiscard]] std::optional<std::int64_t> read_clock() noexcept;
   /// The rate that the kernel holds, against its own oscillator.
@@ -72,6 +77,7 @@ class ClockDevice {
   [[nodiscard]] std::string identity() const;
   [[nodiscard]] std::optional<OsError> probe_rights();
   [[nodiscard]] std::optional<ClockError> failed(int result) noexcept;
+  [[nodiscard]] std::optional<Reading> read_once() noexcept;
 
   Kernel* kernel_;
   std::string name_;
@@ -81,6 +87,7 @@ class ClockDevice {
   Descriptor hold_{};
   Descriptor lock_file_{};
   RateLimits limits_{};
+  std::int64_t quickest_ns_ = 0;  // of all readings; 0: there was none
   int error_number_ = 0;
 };
 

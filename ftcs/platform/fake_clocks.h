@@ -55,6 +55,9 @@ class FakeClocks final : public FakeKernel {
   int commands = 0;                  ///< adjust_clock() calls that asked for a change and got it
   std::int64_t timer_ns = 0;
 
+  clockid_t last_read = -1;         ///< the clock that was read before the one now being read
+  std::function<void()> on_adjust;  ///< before and after each command
+
   FakeClocks() { reading_ns = 20; }
 
   void run(double ns) {
@@ -71,6 +74,7 @@ class FakeClocks final : public FakeKernel {
   std::int64_t clock_ns(clockid_t clock) noexcept override {
     run(static_cast<double>(reading_ns));
     if (on_clock_read) on_clock_read();
+    last_read = clock;
     if (clock == CLOCK_REALTIME) return kEpoch + std::llround(system.time_ns);
     if (clock == CLOCK_MONOTONIC_RAW || clock == CLOCK_MONOTONIC) return std::llround(raw);
     if (phc_gone) return 0;
@@ -131,8 +135,10 @@ class FakeClocks final : public FakeKernel {
     if (&clock != &system && phc_gone) return -ENODEV;
     if (request.modes != 0) {
       if (adjust_errno != 0) return -adjust_errno;
+      if (on_adjust) on_adjust();
       if (const int error = change(clock, request); error != 0) return -error;
       ++commands;
+      if (on_adjust) on_adjust();
     }
     request.freq = clock.freq;
     request.tick = &clock == &system ? clock.tick : 0;

@@ -37,15 +37,6 @@ SteeringHistory::Map starting_at(FreeRunningTime free, LocalTime local, Rate rat
   return {free, local, rate};
 }
 
-// A bracket that an interrupt has made wide says less: only what lies outside of it is believed.
-Duration beyond_bracket(Duration deviation, std::int64_t width_ns) noexcept {
-  constexpr double kUsualWidthNs = 1'000.0;
-  const double slack = std::max(0.0, (static_cast<double>(width_ns) - kUsualWidthNs) / 2.0);
-  if (slack == 0.0) return deviation;
-  const double ns = deviation.ns();
-  return Duration::from_ns(ns - std::clamp(ns, -slack, slack));
-}
-
 }  // namespace
 
 KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_steer)
@@ -67,73 +58,125 @@ KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_
   history_ = SteeringHistory{starting_at(free, local, held_rate_)};
   latest_ = {free, local};
   latest_raw_ns_ = reading->raw_ns;
+  latest_width_ns_ = reading->width_ns;
+  anchor_ = {free, reading->raw_ns, reading->width_ns};
+}
+
+Result<ClockDevice::Reading, ClockError> KernelClock::read_device() noexcept {
+  auto reading = device_.read();
+  if (!reading) failure_ = reading.error();
+  return reading;
+}
+
+FreeRunningTime KernelClock::free_at_raw(std::int64_t raw_ns) const noexcept {
+  return anchor_.free + Duration::from_whole_ns(raw_ns - anchor_.raw_ns);
+}
+
+double KernelClock::anchor_doubt_ns(std::int64_t raw_ns) const noexcept {
+  return kLargestDrift * static_cast<double>(raw_ns - anchor_.raw_ns) +
+         static_cast<double>(anchor_.width_ns);
+}
+
+KernelClock::Deviation KernelClock::deviation_of(const ClockDevice::Reading& now) const noexcept {
+  const FreeRunningTime instant = free_at_raw(now.raw_ns);
+  const double floor_ns =
+      static_cast<double>(device_.is_system() ? kStepFloorSystemNs : kStepFloorPhcNs);
+  const double allowed = anchor_doubt_ns(now.raw_ns) + static_cast<double>(now.width_ns) + floor_ns;
+  const Duration by = local_of(now.clock_ns) - history_.local_at(instant);
+  return {instant, by, std::abs(by.ns()) > allowed};
+}
+
+// What looks like a step is looked at again: whatever a single reading says, history is not changed
+// by it. Of two readings that agree the narrower one says how far it went.
+std::optional<ClockError> KernelClock::confirm_step(ClockDevice::Reading& now) noexcept {
+  constexpr int kAttempts = 3;
+  for (int i = 0; i < kAttempts; ++i) {
+    const auto again = read_device();
+    if (!again) return again.error();
+    if (!deviation_of(*again).is_step) {
+      now = *again;
+      return std::nullopt;
+    }
+    if (again->width_ns <= now.width_ns) now = *again;
+    if (!is_wide(now.width_ns)) return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+// A bracket that an interrupt has made wide says less: only what lies outside of it is believed.
+Duration KernelClock::beyond_bracket(Duration deviation,
+                                     const ClockDevice::Reading& reading) const noexcept {
+  if (!is_wide(reading.width_ns)) return deviation;
+  const double half = static_cast<double>(reading.width_ns) / 2.0;
+  return deviation - Duration::from_ns(std::clamp(deviation.ns(), -half, half));
 }
 
 // One reading of the device, made sense of: small deviations from what the commands say are the
 // truth (CLOCK_REALTIME) or cannot be seen (a hardware clock); large ones are somebody's step.
-std::optional<KernelClock::Faces> KernelClock::look() noexcept {
-  if (failure_) return std::nullopt;
-  const auto now = device_.read();
-  if (!now) {
-    failure_ = now.error();
-    return std::nullopt;
-  }
-  const bool system = device_.is_system();
-  const std::int64_t elapsed_raw = now->raw_ns - latest_raw_ns_;
-  const FreeRunningTime by_raw = system
-                                     ? FreeRunningTime::from_ns(now->raw_ns)
-                                     : latest_.free_running + Duration::from_whole_ns(elapsed_raw);
-  const Duration deviation = local_of(now->clock_ns) - history_.local_at(by_raw);
-  const double allowed = kLargestDrift * static_cast<double>(elapsed_raw) +
-                         static_cast<double>(now->width_ns) +
-                         static_cast<double>(system ? kStepFloorSystemNs : kStepFloorPhcNs);
-  if (std::abs(deviation.ns()) > allowed) {
-    note_leap_or_step(deviation, *now, by_raw);
-  } else if (system) {
-    const Duration seen = beyond_bracket(deviation, now->width_ns);
+bool KernelClock::look() noexcept {
+  if (failure_) return false;
+  auto now = read_device();
+  if (!now) return false;
+  if (deviation_of(*now).is_step && confirm_step(*now)) return false;
+  const Deviation deviation = deviation_of(*now);
+  if (deviation.is_step) {
+    note_leap_or_step(deviation, *now);
+  } else if (device_.is_system()) {
+    const Duration seen = beyond_bracket(deviation.by, *now);
     history_.shift_newest(seen);
-    learn_gain(seen, elapsed_raw);
+    learn_gain(seen, *now);
   }
-  const LocalTime local = local_of(now->clock_ns);
-  latest_ = system ? ClockReading{by_raw, history_.local_at(by_raw)}
-                   : ClockReading{history_.free_running_at(local), local};
-  latest_raw_ns_ = now->raw_ns;
-  return Faces{latest_, now->raw_ns};
+  take(*now, deviation.instant);
+  return true;
 }
 
-void KernelClock::note_leap_or_step(Duration deviation, const ClockDevice::Reading& now,
-                                    FreeRunningTime instant) noexcept {
+void KernelClock::take(const ClockDevice::Reading& now, FreeRunningTime instant) noexcept {
+  const LocalTime local = local_of(now.clock_ns);
+  latest_ = device_.is_system() ? ClockReading{instant, history_.local_at(instant)}
+                                : ClockReading{history_.free_running_at(local), local};
+  latest_raw_ns_ = now.raw_ns;
+  latest_width_ns_ = now.width_ns;
+  if (static_cast<double>(now.width_ns) <= anchor_doubt_ns(now.raw_ns)) {
+    anchor_ = {latest_.free_running, now.raw_ns, now.width_ns};
+  }
+}
+
+void KernelClock::note_leap_or_step(const Deviation& deviation,
+                                    const ClockDevice::Reading& now) noexcept {
   constexpr double kSecondNs = 1e9;
   if (expected_leap_ != 0 &&
-      std::abs(deviation.ns() + expected_leap_ * kSecondNs) < kLeapToleranceNs) {
+      std::abs(deviation.by.ns() + expected_leap_ * kSecondNs) < kLeapToleranceNs) {
     timescale_offset_ += Duration::from_ns(expected_leap_ * kSecondNs);
     foreign_.leap = std::exchange(expected_leap_, 0);
     trusted_since_ns_ = std::numeric_limits<std::int64_t>::min();
     return;
   }
-  history_.steer(instant, history_.rate_at(instant), deviation);
+  history_.steer(deviation.instant, history_.rate_at(deviation.instant), deviation.by);
   ++foreign_steps_;
-  foreign_.step = foreign_.step.value_or(Duration{}) + deviation;
+  foreign_.step = foreign_.step.value_or(Duration{}) + deviation.by;
   trusted_since_ns_ = now.clock_ns;
+  forget_gain_interval();
+}
+
+void KernelClock::forget_gain_interval() noexcept {
   gain_deviation_ = {};
   gain_elapsed_ns_ = 0;
 }
 
-void KernelClock::learn_gain(Duration deviation, std::int64_t elapsed_raw_ns) noexcept {
+void KernelClock::learn_gain(Duration deviation, const ClockDevice::Reading& now) noexcept {
   if (!has_steered_) return;
+  if (is_wide(now.width_ns) || is_wide(latest_width_ns_)) return forget_gain_interval();
   gain_deviation_ += deviation;
-  gain_elapsed_ns_ += elapsed_raw_ns;
+  gain_elapsed_ns_ += now.raw_ns - latest_raw_ns_;
   if (gain_elapsed_ns_ < kGainIntervalNs) return;
   const double surplus = gain_deviation_.ns() / static_cast<double>(gain_elapsed_ns_);
   gain_ = std::clamp(gain_ + kGainWeight * surplus, 1.0 - kLargestGain, 1.0 + kLargestGain);
-  gain_deviation_ = {};
-  gain_elapsed_ns_ = 0;
+  forget_gain_interval();
 }
 
 ClockReading KernelClock::read() noexcept {
-  const auto seen = look();
-  if (!seen) return latest_;
-  if (end_ && *end_ - seen->reading.free_running <= kTimerGrain) end_correction();
+  if (!look()) return latest_;
+  if (end_ && *end_ - latest_.free_running <= kTimerGrain) end_correction();
   return latest_;
 }
 
@@ -141,7 +184,8 @@ std::optional<FreeRunningTime> KernelClock::from_stamp(std::int64_t clock_ns) no
   const ClockReading now = read();
   const LocalTime local = local_of(clock_ns);
   if (clock_ns < trusted_since_ns_) return std::nullopt;
-  if (local - now.local > Duration::from_whole_ns(kReadingToleranceNs)) return std::nullopt;
+  const std::int64_t doubt_ns = latest_width_ns_ + kReadingToleranceNs;
+  if (local - now.local > Duration::from_whole_ns(doubt_ns)) return std::nullopt;
   return history_.free_running_at(local);
 }
 
@@ -178,44 +222,54 @@ Result<ClockReading, ClockError> KernelClock::apply(const ServoCommand& command)
   return latest_;
 }
 
-// The change lies between a reading before and one after it: in the middle, as far as we know.
-std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noexcept {
-  const ClockReading before = latest_;
-  const std::int64_t raw_before = latest_raw_ns_;
-  const bool system = device_.is_system();
-  const Rate wanted = system ? limits_.clamp(Rate::from_ratio(rate.ratio() / gain_)) : rate;
+Result<Rate, ClockError> KernelClock::command(Rate rate, Duration step) noexcept {
+  const auto failed = [this](ClockError error) {
+    if (error == ClockError::kGone) failure_ = error;
+    return error;
+  };
+  const Rate wanted =
+      device_.is_system() ? limits_.clamp(Rate::from_ratio(rate.ratio() / gain_)) : rate;
   const auto set = device_.set_rate(wanted);
-  if (!set) {
-    if (set.error() == ClockError::kGone) failure_ = set.error();
-    return set.error();
+  if (!set) return failed(set.error());
+  if (step == Duration{}) return *set;
+  if (const auto error = device_.step(step)) {
+    (void)device_.set_rate(held_rate_);  // on an error nothing has changed
+    return failed(*error);
   }
+  return *set;
+}
+
+// The change lies between two readings of CLOCK_MONOTONIC_RAW: in the middle, as far as we know,
+// and after what has been read of the clock before.
+std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noexcept {
   const Duration whole_step = Duration::from_whole_ns(step.rounded_ns());
-  if (whole_step != Duration{}) {
-    if (const auto error = device_.step(whole_step)) {
-      (void)device_.set_rate(held_rate_);  // on an error nothing has changed
-      if (*error == ClockError::kGone) failure_ = *error;
-      return error;
-    }
-  }
+  const double old_ratio = history_.rate_at(latest_.free_running).ratio();
+  const std::int64_t before = device_.read_raw();
+  const auto set = command(rate, whole_step);
+  if (!set) return set.error();
+  const std::int64_t half_ns = (device_.read_raw() - before) / 2;
   held_rate_ = *set;
   has_steered_ = true;
-  const auto after = device_.read();
-  if (!after) return failure_ = after.error();
-  const Duration elapsed = system ? Duration::from_whole_ns(after->raw_ns - raw_before)
-                                  : local_of(after->clock_ns) - before.local - whole_step;
-  const FreeRunningTime changed = before.free_running + elapsed.half();
-  const Rate effective = system ? Rate::from_ratio(set->ratio() * gain_) : *set;
-  history_.steer(changed, effective, whole_step);
-  const LocalTime local = local_of(after->clock_ns);
-  if (system) {
-    const auto free = FreeRunningTime::from_ns(after->raw_ns);
-    history_.shift_newest(local - history_.local_at(free));
-    latest_ = {free, local};
-  } else {
-    latest_ = {history_.free_running_at(local), local};
-  }
-  latest_raw_ns_ = after->raw_ns;
+  const Rate effective = device_.is_system() ? Rate::from_ratio(set->ratio() * gain_) : *set;
+  history_.steer(std::max(free_at_raw(before + half_ns), latest_.free_running), effective,
+                 whole_step);
+  const auto after = read_device();
+  if (!after) return after.error();
+  place_change(*after, std::abs(effective.ratio() - old_ratio) * static_cast<double>(half_ns));
   return std::nullopt;
+}
+
+// The reading after a change says where CLOCK_REALTIME is. It says how late the change of a
+// hardware clock came, if the command was held up for longer than readings are wide.
+void KernelClock::place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept {
+  const FreeRunningTime instant = free_at_raw(after.raw_ns);
+  const Duration seen = local_of(after.clock_ns) - history_.local_at(instant);
+  if (device_.is_system()) {
+    history_.shift_newest(beyond_bracket(seen, after));
+  } else if (doubt_ns > anchor_doubt_ns(after.raw_ns) + static_cast<double>(after.width_ns)) {
+    history_.shift_newest(Duration::from_ns(std::clamp(seen.ns(), -doubt_ns, doubt_ns)));
+  }
+  take(after, instant);
 }
 
 // On an error the correction goes on; the next command, or a reading a little later, tries again.
@@ -229,6 +283,12 @@ void KernelClock::end_correction() noexcept {
 
 void KernelClock::settle() noexcept {
   if (end_ && look()) end_correction();
+}
+
+void KernelClock::settle_at(Rate rate) noexcept {
+  if (!has_steered_ || rate == tracking_rate_) return settle();
+  tracking_rate_ = limits_.clamp(rate);
+  if (look()) end_correction();
 }
 
 void KernelClock::set_timescale_offset(Duration ahead) noexcept {

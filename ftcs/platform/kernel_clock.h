@@ -51,9 +51,15 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   /// How long to sleep on CLOCK_MONOTONIC, which may be steered along with this clock: never too
   /// long, so that a second, shorter sleep may be needed.
   [[nodiscard]] std::optional<std::int64_t> wait_for_expiry_ns() noexcept;
-  /// Ends a correction at once; the clock keeps the tracking rate. To be called before the program
-  /// ends.
+  /// Ends a correction at once; the clock keeps the tracking rate.
   void settle() noexcept;
+  /// Ends a correction at once and leaves a clock that was steered at this rate, before the program
+  /// ends.
+  void settle_at(Rate rate) noexcept;
+  /// Has a command been applied?
+  [[nodiscard]] bool is_steered() const noexcept { return has_steered_; }
+  /// What holds when no correction runs; at first what the kernel held.
+  [[nodiscard]] Rate tracking_rate() const noexcept { return tracking_rate_; }
 
   /// What local time is ahead of the clock's own reading by: TAI - UTC for CLOCK_REALTIME that
   /// follows a TAI reference. A change moves local time.
@@ -76,17 +82,34 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] const ClockDevice& device() const noexcept { return device_; }
 
  private:
-  struct Faces {
-    ClockReading reading;
-    std::int64_t raw_ns = 0;
+  /// A reading against what the commands say.
+  struct Deviation {
+    FreeRunningTime instant;  ///< of the reading, by CLOCK_MONOTONIC_RAW
+    Duration by;
+    bool is_step = false;  ///< both readings' widths and all drift in between do not explain it
   };
 
-  [[nodiscard]] std::optional<Faces> look() noexcept;
-  void learn_gain(Duration deviation, std::int64_t elapsed_raw_ns) noexcept;
-  void note_leap_or_step(Duration deviation, const ClockDevice::Reading& now,
-                         FreeRunningTime instant) noexcept;
+  [[nodiscard]] Result<ClockDevice::Reading, ClockError> read_device() noexcept;
+  [[nodiscard]] bool look() noexcept;
+  [[nodiscard]] Deviation deviation_of(const ClockDevice::Reading& now) const noexcept;
+  [[nodiscard]] std::optional<ClockError> confirm_step(ClockDevice::Reading& now) noexcept;
+  void take(const ClockDevice::Reading& now, FreeRunningTime instant) noexcept;
+  [[nodiscard]] FreeRunningTime free_at_raw(std::int64_t raw_ns) const noexcept;
+  [[nodiscard]] double anchor_doubt_ns(std::int64_t raw_ns) const noexcept;
+  // An interrupt came in between.
+  [[nodiscard]] bool is_wide(std::int64_t width_ns) const noexcept {
+    constexpr std::int64_t kUsualSpread = 4;
+    return width_ns > kUsualSpread * device_.quickest_ns();
+  }
+  [[nodiscard]] Duration beyond_bracket(Duration deviation,
+                                        const ClockDevice::Reading& reading) const noexcept;
+  void learn_gain(Duration deviation, const ClockDevice::Reading& now) noexcept;
+  void forget_gain_interval() noexcept;
+  void note_leap_or_step(const Deviation& deviation, const ClockDevice::Reading& now) noexcept;
   void check_rate() noexcept;
   [[nodiscard]] std::optional<ClockError> change_rate(Rate rate, Duration step) noexcept;
+  [[nodiscard]] Result<Rate, ClockError> command(Rate rate, Duration step) noexcept;
+  void place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept;
   void end_correction() noexcept;
   [[nodiscard]] LocalTime local_of(std::int64_t clock_ns) const noexcept {
     return LocalTime{Duration::from_whole_ns(clock_ns) + timescale_offset_};
@@ -101,6 +124,14 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   bool has_steered_ = false;
   ClockReading latest_{};  // of the last look at the device
   std::int64_t latest_raw_ns_ = 0;
+  std::int64_t latest_width_ns_ = 0;
+  // The reading that says best what the free-running face shows when CLOCK_MONOTONIC_RAW shows
+  // something: not the last one, if that was wide.
+  struct Anchor {
+    FreeRunningTime free{};
+    std::int64_t raw_ns = 0;
+    std::int64_t width_ns = 0;
+  } anchor_{};
   std::int64_t trusted_since_ns_;         // older stamps belong to before somebody's step
   std::optional<FreeRunningTime> end_{};  // of the running correction
   Rate tracking_rate_{};

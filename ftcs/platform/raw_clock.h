@@ -48,8 +48,9 @@ enum class MappingError : std::uint8_t {
 /// Each mapping takes its own bracketed readings RAW, REALTIME, RAW and keeps the tightest of
 /// several, because the kernel slews REALTIME against RAW all the time: with y the fractional slew,
 /// a reading that is a old is wrong by a y. The rate between two mappings corrects for the age of
-/// the stamp. A change of the difference that no slew explains is a step: stamps from before it are
-/// refused, later ones are good again.
+/// the stamp. A change of the difference that no slew and no width of a reading explains, twice, is
+/// a step: stamps from before it are refused, later ones are good again. Where every reading was
+/// preempted, the last narrow one is believed more than the wide one of now.
 class RealtimeToRaw {
  public:
   explicit RealtimeToRaw(Kernel& kernel) noexcept;
@@ -69,6 +70,15 @@ class RealtimeToRaw {
   [[nodiscard]] Reading read() noexcept;
 
  private:
+  /// What REALTIME has gained on RAW since the baseline.
+  struct Gain {
+    std::int64_t elapsed_ns = 0;  ///< of RAW
+    std::int64_t by_ns = 0;
+    std::int64_t doubt_ns = 0;  ///< of both readings
+    bool is_step = false;
+  };
+  [[nodiscard]] Gain gain_of(const Reading& now) const noexcept;
+  [[nodiscard]] Reading read_confirmed() noexcept;
   void learn(const Reading& now) noexcept;
 
   Kernel& kernel_;

@@ -3,6 +3,9 @@
 // or set.
 #include "ftcs/platform/raw_clock.h"
 
+#include <cmath>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "ftcs/platform/fake_kernel.h"
@@ -71,6 +74,70 @@ TEST(RealtimeToRaw, keeps_the_tightest_reading_when_interrupts_disturb_others) {
     ++reading;
   };
   EXPECT_LE(mapping.read().width_ns, 200);
+}
+
+// Interrupted right after REALTIME was read, `times` times: the middle of the bracket is 3 ms late.
+void preempt(FakeKernel& kernel, int times) {
+  kernel.on_clock_read = [&kernel, times, call = 0]() mutable {
+    const bool second_raw = call++ % 3 == 2;
+    if (second_raw && times-- > 0) kernel.advance(6 * kMillisecond);
+  };
+}
+
+TEST(RealtimeToRaw, a_preempted_reading_is_no_step_and_moves_no_stamp) {
+  for (const int times : {1, 5, 1000}) {
+    for (const bool baseline : {true, false}) {
+      FakeKernel kernel;
+      if (baseline) preempt(kernel, times);
+      RealtimeToRaw mapping(kernel);
+      if (baseline) kernel.on_clock_read = nullptr;
+      for (int i = 0; i < 20; ++i) {
+        kernel.advance(5 * kMillisecond);
+        const std::int64_t stamp = kernel.realtime_ns;
+        const std::int64_t raw = kernel.raw_ns;
+        if (!baseline && i == 10) preempt(kernel, times);
+        const auto mapped = mapping.map(stamp);
+        kernel.on_clock_read = nullptr;
+        ASSERT_TRUE(mapped.ok()) << times << " readings, " << i;
+        EXPECT_NEAR((*mapped - FreeRunningTime::from_ns(raw)).ns(), 0.0, 2 * kBracketNs)
+            << times << " readings, " << i;
+      }
+      EXPECT_EQ(mapping.steps(), 0U);
+    }
+  }
+}
+
+// A slew of 400 ppm all the time, seen by a machine that is preempted at random for 60 s.
+TEST(RealtimeToRaw, a_busy_minute_holds_no_step_and_no_wrong_slew) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    FakeKernel kernel;
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> uniform;
+    double slewed = 0.0;
+    const auto pass = [&](std::int64_t ns) {
+      kernel.advance(ns);
+      slewed += 400e-6 * static_cast<double>(ns);
+      kernel.realtime_ns += static_cast<std::int64_t>(slewed);
+      slewed -= std::floor(slewed);
+    };
+    bool again = false;
+    kernel.on_clock_read = [&] {
+      again = uniform(random) < (again ? 0.8 : 0.05);
+      if (again) pass(6 * kMillisecond);
+    };
+    RealtimeToRaw mapping(kernel);
+    for (int i = 0; i < 8 * 60; ++i) {
+      pass(125 * kMillisecond);
+      const std::int64_t stamp = kernel.realtime_ns;
+      const std::int64_t raw = kernel.raw_ns;
+      const auto mapped = mapping.map(stamp);
+      ASSERT_TRUE(mapped.ok());
+      // The age of a stamp is up to 0.2 s where every reading was preempted.
+      if (i <= 5) continue;
+      EXPECT_NEAR((*mapped - FreeRunningTime::from_ns(raw)).ns(), 0.0, 1'000.0) << seed;
+    }
+    EXPECT_EQ(mapping.steps(), 0U) << "seed " << seed;
+  }
 }
 
 TEST(RealtimeToRaw, refuses_a_stamp_from_the_future) {

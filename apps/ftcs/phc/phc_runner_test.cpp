@@ -10,6 +10,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "ftcs/platform/fake_clocks.h"
+#include "ftcs/platform/fake_preemption.h"
 
 namespace ftcs::app {
 namespace {
@@ -164,6 +165,23 @@ TEST(PhcRunner, slow_readings_count_for_less) {
       if (slow) world.kernel.run(static_cast<double>((state >> 40) % 40'000));
     };
     EXPECT_LT(world.largest_difference(300.0, 60.0), 2'000.0) << readings;
+  }
+}
+
+// Preempted for up to 6 ms at random: each sample is taken for what its width says, and no reading
+// for a step by another program.
+TEST(PhcRunner, a_busy_machine_moves_no_clock) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    for (const bool system_leads : {false, true}) {
+      World world;
+      if (system_leads) world.options.sink = "/dev/ptp0";
+      if (system_leads) world.options.source = "CLOCK_REALTIME";
+      world.options.rate_hz = 8.0;
+      world.kernel.precise_errno = 0;
+      const platform::FakePreemption preemption(world.kernel, seed);
+      EXPECT_LT(world.largest_difference(60.0, 10.0), 1'000.0)
+          << "seed " << seed << (system_leads ? ", system leads" : "");
+    }
   }
 }
 
