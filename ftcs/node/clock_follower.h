@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/measurement/link_delay.h"
+#include "ftcs/measurement/shared_timescale.h"
+#include "ftcs/node/follower_event.h"
+#include "ftcs/ptp/actions.h"
+
+namespace ftcs::node {
+
+struct ClockFollowerConfig {
+  DisciplineConfig discipline{};
+  /// The delay of the link is measured beside the pairs (on_link_delay()) and taken off before the
+  /// servo sees one; the servo's own path delay is then what the link's differs by.
+  bool peer_to_peer = false;
+  /// Of the link delay, by discipline.servo.two_way.path_delay.filter, even for the adaptive servo.
+  /// Without it that servo has a steady mean, and hears the neighbour's stamps too (decision 0015).
+  bool filter_is_chosen = false;
+};
+
+/// What stands between a source of timestamps and the discipline of a clock: which stamps steer, in
+/// which order, what delay is taken off them, and when all begins anew.
+///
+///     event:  local - (reference ± link delay) = offset ± (path delay - link delay)
+///
+/// Without I/O. After each input the events are to be taken with next() until there is none.
+class ClockFollower {
+ public:
+  /// The clock must outlive the follower. Valid: validate(config.discipline.servo) finds nothing.
+  ClockFollower(const ClockFollowerConfig& config, AdjustableClock& clock) noexcept;
+
+  /// Before the first message: a rate that is known already.
+  [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept {
+    return discipline_.start_at(rate);
+  }
+  /// `sync_interval`: of the source, where it is known.
+  void on_pair(const EventPair& pair, std::optional<Duration> sync_interval) noexcept;
+  /// Peer to peer: one exchange beside the pairs, first of all the delay of the link. Until there
+  /// is one, nothing is steered: the newest pair waits. With stamps, the neighbour is the
+  /// transmitter: while they show the time of its Syncs the adaptive servo hears them too and
+  /// estimates the path delay itself (decision 0015).
+  void on_link_delay(const ptp::EmitPeerDelay& measured,
+                     std::optional<Duration> sync_interval) noexcept;
+  /// Another link: its delay is not known yet.
+  void on_new_link() noexcept;
+  /// Nothing may have come for a while; as often as liked.
+  void on_silence() noexcept;
+  /// Another reference: what was learnt about the old one is void.
+  void on_new_reference() noexcept;
+  /// The clock was put onto another timescale: begins anew, the bound of the first offset included.
+  void on_new_timescale() noexcept;
+
+  /// What the inputs brought about, oldest first; none: all is told.
+  [[nodiscard]] std::optional<FollowerEvent> next() noexcept;
+
+  [[nodiscard]] bool locked() const noexcept { return discipline_.locked(); }
+  [[nodiscard]] const ClockDiscipline& discipline() const noexcept { return discipline_; }
+
+ private:
+  /// One exchange that another link, a waiting pair, a response and a request come of at once, each
+  /// with all its notes, makes eleven.
+  static constexpr std::size_t kMostEvents = 12;
+
+  [[nodiscard]] Steered steer(EventPair pair, bool paces) noexcept;
+  void note_refusals(const Telemetry& telemetry) noexcept;
+  void hear_stamps(const ptp::PeerStamps& stamps) noexcept;
+  void hear_response(FreeRunningTime before) noexcept;
+  void follow_timescale(const EventPair& sync) noexcept;
+  void follow_verdict(SharedTimescale::Verdict before) noexcept;
+  void begin_anew(const Note& note) noexcept;
+  void forget_stamps() noexcept;
+  [[nodiscard]] bool is_another_link(Duration mean_link_delay) const noexcept;
+  [[nodiscard]] bool hears_stamps() const noexcept;
+  [[nodiscard]] bool shares_timescale() const noexcept {
+    return timescale_.verdict() == SharedTimescale::Verdict::kShared;
+  }
+  [[nodiscard]] Duration delay_taken_off() const noexcept {
+    return shares_timescale() ? start_delay_ : link_delay_.value();
+  }
+  void tell(const FollowerEvent& event) noexcept;
+
+  ClockFollowerConfig config_;
+  AdjustableClock& clock_;
+  ClockDiscipline discipline_;
+  LinkDelay link_delay_;
+  SharedTimescale timescale_;  ///< of the neighbour's stamps
+  /// Heard with the next Sync: of the two the one whose event came first.
+  std::optional<EventPair> response_{};
+  int unstamped_exchanges_ = 0;  ///< since the last Sync
+  int syncs_without_stamps_ = 0;
+  Duration start_delay_{};  ///< the link's when the servo began to estimate what it differs by
+  std::optional<EventPair> waiting_{};  ///< for the first link delay
+  bool in_holdover_ = false;
+  std::uint32_t refused_syncs_ = 0;  ///< in a row
+  bool clock_refuses_ = false;
+  std::array<FollowerEvent, kMostEvents> events_{};
+  std::size_t told_ = 0;
+  std::size_t taken_ = 0;
+};
+
+}  // namespace ftcs::node

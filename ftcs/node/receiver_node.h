@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <variant>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/node/clock_follower.h"
+#include "ftcs/node/follower_event.h"
+#include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/time_receiver.h"
+
+namespace ftcs::node {
+
+struct ReceiverNodeConfig {
+  ptp::TimeReceiverConfig port{};
+  ClockFollowerConfig follower{};  ///< peer_to_peer is taken from the port's delay_mechanism
+};
+
+/// Either something to be done or told outside (never ptp::EmitPair nor ptp::EmitPeerDelay: those
+/// stay inside), or what the clock's side of the node did.
+using ReceiverEvent = std::variant<ptp::Action, Steered, Note>;
+
+/// A clock that follows a PTP time transmitter, from octets to commands:
+///
+///     octets, stamps ─► ptp::TimeReceiver ─► ClockFollower ─► ClockDiscipline ─► AdjustableClock
+///                             ▲                                     │
+///                             └──────── locked, not locked ─────────┘
+///
+/// Without I/O: the daemon and the simulator feed the same object. `now` and event stamps are
+/// readings of the free-running oscillator; `now` must not run backward. After each input the
+/// events are to be taken with next() until there is none. Work is done event by event: who changes
+/// the clock's timescale upon ptp::TransmitterSelected (on_new_timescale()) does so before the
+/// first pair of that transmitter is steered.
+class ReceiverNode {
+ public:
+  /// The clock must outlive the node.
+  ReceiverNode(const ReceiverNodeConfig& config, AdjustableClock& clock) noexcept;
+
+  /// Before the first message: a rate that is known already.
+  [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept {
+    return follower_.start_at(rate);
+  }
+  /// Inputs of ptp::TimeReceiver, which see.
+  void start(FreeRunningTime now) noexcept;
+  void on_event_message(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                        FreeRunningTime now) noexcept;
+  void on_general_message(std::span<const std::uint8_t> bytes, FreeRunningTime now) noexcept;
+  void on_transmit_timestamp(const ptp::EventId& id, FreeRunningTime sent,
+                             FreeRunningTime now) noexcept;
+  void on_transmit_timestamp_missing(const ptp::EventId& id, FreeRunningTime now) noexcept;
+  void on_timer(FreeRunningTime now) noexcept;
+  void on_link_down(FreeRunningTime now) noexcept;
+  void on_link_up(FreeRunningTime now) noexcept;
+  /// Once per turn of the loop, and at least every second: notices that Syncs have stopped.
+  void on_silence(FreeRunningTime now) noexcept;
+  /// The steered clock was put onto another timescale. May stand between two calls of next().
+  void on_new_timescale() noexcept { follower_.on_new_timescale(); }
+
+  /// What the inputs brought about, in order; none: all is done.
+  [[nodiscard]] std::optional<ReceiverEvent> next() noexcept;
+
+  /// When on_timer() must be called, if no other input comes first.
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept {
+    return port_.deadline();
+  }
+  [[nodiscard]] bool locked() const noexcept { return follower_.locked(); }
+  [[nodiscard]] const ptp::TimeReceiver& port() const noexcept { return port_; }
+  [[nodiscard]] const ClockDiscipline& discipline() const noexcept {
+    return follower_.discipline();
+  }
+
+ private:
+  void take(const ptp::ActionList& actions, FreeRunningTime now) noexcept;
+  [[nodiscard]] bool keeps(const ptp::Action& action) noexcept;
+  void tell_port_of_lock(FreeRunningTime now) noexcept;
+
+  ptp::TimeReceiver port_;
+  ClockFollower follower_;
+  bool had_transmitter_ = false;
+  FreeRunningTime now_{};  ///< of the last input
+  ptp::ActionList actions_{};
+  std::size_t taken_ = 0;           ///< of actions_
+  ptp::ActionList lock_actions_{};  ///< what the port makes of locked or not
+  std::size_t lock_actions_taken_ = 0;
+  bool pair_was_fed_ = false;  ///< and the port does not know yet what came of it
+};
+
+}  // namespace ftcs::node

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+//
+// World: octets of a transmitter that the test writes with its own hand; the receiver's oscillator
+// shows true time plus 5 s; its clock starts 1 us ahead.
+#include "ftcs/node/receiver_node.h"
+
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/ptp/receiver_fixture.h"
+#include "test/support/forbid_allocation.h"
+#include "test/support/manual_source.h"
+#include "test/support/watched_clock.h"
+
+namespace ftcs::node {
+namespace {
+using namespace std::chrono_literals;
+using ptp::PortState;
+using ptp::receiver_test::announce_from;
+using ptp::receiver_test::bytes_of;
+using ptp::receiver_test::kA;
+using ptp::receiver_test::kB;
+using ptp::receiver_test::kDelay;
+using ptp::receiver_test::kEpoch;
+using ptp::receiver_test::kUs;
+using ptp::receiver_test::local;
+using ptp::receiver_test::message_from;
+using ptp::receiver_test::reference;
+using ptp::receiver_test::sync_from;
+
+constexpr Nanoseconds kInterval = 125ms;
+
+class Node : public testing::Test {
+ protected:
+  Node() {
+    config.port.port = kUs;
+    config.port.log_min_delay_req_interval = -3;
+    config.follower.discipline.servo.kind = ServoKind::kFtcs;
+  }
+  void begin(Nanoseconds ahead = 1us) {
+    source.instant = local(0s);
+    clock.emplace(source, Duration{kEpoch - 5s + ahead});
+    node.emplace(config, *clock);
+    node->start(local(0s));
+    take();
+  }
+
+  void take() {
+    while (const auto event = node->next()) {
+      events.push_back(*event);
+      if (between) between(*event);
+      const auto* action = std::get_if<ptp::Action>(&*event);
+      const auto* sent = action != nullptr ? std::get_if<ptp::SendMessage>(action) : nullptr;
+      if (sent != nullptr) requests.push_back(sent->id());
+    }
+  }
+  void at(Nanoseconds time) {
+    now = time;
+    source.instant = local(time);
+  }
+  void general(const ptp::Message& message, Nanoseconds time) {
+    at(time);
+    node->on_general_message(bytes_of(message).view(), local(time));
+    take();
+  }
+  void announce(const ptp::PortIdentity& who, Nanoseconds time, std::uint8_t priority1 = 128) {
+    general(announce_from(who, priority1), time);
+  }
+  void sync(const ptp::PortIdentity& who, Nanoseconds sent) {
+    at(sent + kDelay);
+    node->on_event_message(bytes_of(sync_from(who, sequence)).view(), local(now), local(now));
+    take();
+    general(message_from(who, sequence++, ptp::FollowUp{reference(sent)}), sent + 2 * kDelay);
+  }
+  /// What timers are due, and an answer to what they asked.
+  void timers(Nanoseconds until) {
+    while (node->deadline() && *node->deadline() <= local(until)) {
+      at(std::max(now, Nanoseconds{(*node->deadline() - local(0s)).floor_ns() + 1}));
+      node->on_timer(source.instant);
+      take();
+      for (const ptp::EventId& id : std::exchange(requests, {})) answer(id);
+    }
+  }
+  void answer(const ptp::EventId& id) {
+    const Nanoseconds sent = now;
+    node->on_transmit_timestamp(id, local(sent), local(sent + 1us));
+    take();
+    general(message_from(kA, id.sequence_id, ptp::DelayResp{reference(sent + kDelay), kUs}),
+            sent + 3 * kDelay);
+  }
+  void cycles(int count) {
+    for (int i = 0; i < count; ++i) {
+      const Nanoseconds next = start + kInterval;
+      timers(next);
+      start = next;
+      sync(kA, start);
+      if (++beats % 8 == 0) announce(kA, start + 1ms);
+      node->on_silence(local(now));
+      take();
+    }
+  }
+  void lock() {
+    begin();
+    announce(kA, 0s);
+    announce(kA, 250ms);
+    start = 250ms;
+    cycles(80);
+  }
+  template <class T>
+  [[nodiscard]] std::vector<std::size_t> places() const {
+    std::vector<std::size_t> result;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const auto* action = std::get_if<ptp::Action>(&events[i]);
+      if constexpr (std::is_same_v<T, Steered> || std::is_same_v<T, Note>) {
+        if (std::holds_alternative<T>(events[i])) result.push_back(i);
+      } else if (action != nullptr && std::holds_alternative<T>(*action)) {
+        result.push_back(i);
+      }
+    }
+    return result;
+  }
+  [[nodiscard]] double error_ns() {
+    return (clock->local_at(source.instant).since_epoch() - reference(now).since_epoch()).ns();
+  }
+
+  ReceiverNodeConfig config;
+  test::ManualSource source;
+  std::optional<test::WatchedClock> clock;
+  std::optional<ReceiverNode> node;
+  std::vector<ReceiverEvent> events;
+  std::function<void(const ReceiverEvent&)> between;
+  std::vector<ptp::EventId> requests;
+  std::uint16_t sequence = 0;
+  Nanoseconds now{};
+  Nanoseconds start{};
+  int beats = 0;
+};
+
+TEST_F(Node, octets_and_stamps_lock_the_clock_and_the_port_hears_of_it) {
+  lock();
+  EXPECT_NEAR(error_ns(), 0.0, 1.0);
+  EXPECT_TRUE(node->locked());
+  EXPECT_EQ(node->port().state(), PortState::kTimeReceiver);
+  EXPECT_TRUE(places<ptp::EmitPair>().empty()) << "pairs stay inside";
+}
+
+TEST_F(Node, the_sample_that_locks_is_told_before_the_state_that_it_leads_to) {
+  lock();
+  const auto changes = places<ptp::PortStateChanged>();
+  const auto& last = std::get<ptp::PortStateChanged>(std::get<ptp::Action>(events[changes.back()]));
+  ASSERT_EQ(last.to, PortState::kTimeReceiver);
+  ASSERT_TRUE(std::holds_alternative<Steered>(events[changes.back() - 1]));
+  EXPECT_TRUE(std::get<Steered>(events[changes.back() - 1]).telemetry.locked);
+}
+
+TEST_F(Node, silence_takes_the_port_out_of_its_state) {
+  lock();
+  at(now + 1s);
+  node->on_silence(local(now));
+  take();
+  EXPECT_EQ(node->port().state(), PortState::kUncalibrated);
+  ASSERT_TRUE(std::holds_alternative<ptp::Action>(events.back()));
+  ASSERT_FALSE(places<Note>().empty());
+  EXPECT_EQ(std::get<Note>(events[places<Note>().back()]).kind, NoteKind::kHoldover);
+}
+
+TEST_F(Node, another_transmitter_is_another_reference_the_first_one_is_not) {
+  lock();
+  EXPECT_EQ(node->discipline().counters().new_references, 0U);
+  announce(kB, now + 1ms, 1);
+  announce(kB, now + 250ms, 1);
+  EXPECT_EQ(node->discipline().counters().new_references, 1U);
+  EXPECT_FALSE(node->locked());
+}
+
+// With fast start the first Announce selects, and the Syncs that came before it follow at once: in
+// between the clock may be put onto the transmitter's timescale.
+TEST_F(Node, a_timescale_told_with_the_transmitter_is_in_force_before_its_first_pair) {
+  config.port.fast_start = true;
+  config.follower.discipline.largest_first_offset = 1s;
+  begin(37s);
+  for (int i = 0; i < 3; ++i) sync(kA, i * kInterval);
+  between = [this](const ReceiverEvent& event) {
+    const auto* action = std::get_if<ptp::Action>(&event);
+    if (action == nullptr || !std::holds_alternative<ptp::TransmitterSelected>(*action)) return;
+    ServoCommand step;
+    step.step = Duration{-37s};
+    EXPECT_TRUE(clock->apply(step).ok());
+    node->on_new_timescale();
+  };
+  announce(kA, 3 * kInterval);
+  start = 3 * kInterval;
+  cycles(40);
+  EXPECT_TRUE(node->locked());
+  EXPECT_EQ(node->discipline().counters().refused, 0U);
+  EXPECT_FALSE(places<Steered>().empty());
+}
+
+TEST_F(Node, a_jump_of_the_reference_is_told_and_begins_anew) {
+  lock();
+  events.clear();
+  start += kInterval;
+  at(start + kDelay);
+  node->on_event_message(bytes_of(sync_from(kA, sequence)).view(), local(now), local(now));
+  take();
+  general(message_from(kA, sequence++, ptp::FollowUp{reference(start + 10s)}), start + 2 * kDelay);
+  EXPECT_EQ(places<ptp::ReferenceJumped>().size(), 1U);
+  EXPECT_EQ(node->discipline().counters().new_references, 1U);
+}
+
+TEST_F(Node, peer_to_peer_waits_for_the_delay_of_each_new_link) {
+  config.port.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  begin();
+  announce(kA, 0s);
+  announce(kA, 250ms);
+  for (int i = 3; i < 10; ++i) sync(kA, i * kInterval);
+  EXPECT_TRUE(places<Steered>().empty());
+  EXPECT_EQ(node->discipline().counters().commands, 0U);
+}
+
+TEST_F(Node, takes_no_memory_but_its_own) {
+  lock();
+  events.reserve(10'000);
+  requests.reserve(10);
+  const auto octets = bytes_of(sync_from(kA, sequence));
+  const auto follow_up =
+      bytes_of(message_from(kA, sequence, ptp::FollowUp{reference(start + kInterval)}));
+  at(start + kInterval + kDelay);
+  const test::ForbidAllocation none;
+  node->on_event_message(octets.view(), local(now), local(now));
+  while (node->next()) continue;
+  node->on_general_message(follow_up.view(), local(now));
+  while (node->next()) continue;
+  node->on_timer(local(now));
+  while (node->next()) continue;
+}
+
+}  // namespace
+}  // namespace ftcs::node
