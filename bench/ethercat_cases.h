@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "ftcs/discipline/cycle_servo.h"
-#include "ftcs/ethercat/maindevice/circle_path.h"
 #include "ftcs/ethercat/maindevice/csp_axis.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
-#include "ftcs/ethercat/subdevice/segment.h"
+#include "ftcs/node/circle_path.h"
+#include "ftcs/sim/drives/segment.h"
 
 namespace ftcs::bench {
 
@@ -142,7 +142,7 @@ class EthercatCycleCase {
   std::unique_ptr<ethercat::Segment> segment_;
   std::array<ethercat::AffineOscillator, kDrives> crystals_;
   std::array<ethercat::CspAxis, kDrives> axes_;
-  ethercat::CirclePath path_{10'000.0, 2.0};
+  node::CirclePath path_{10'000.0, 2.0};
   bool all_enabled_ = false;
   std::array<std::uint8_t, ethercat::kMaxFrameSize> buffer_{};
   FreeRunningTime now_ = FreeRunningTime::from_ns(1'000'000);

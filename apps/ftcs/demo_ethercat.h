@@ -4,8 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "apps/ftcs/ethercat/local_segment.h"
-#include "apps/ftcs/ethercat/main_runner.h"
+#include "ftcs/daemon/ethercat/local_segment.h"
+#include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/report/json.h"
 
 namespace ftcs::app {
 
@@ -17,11 +18,11 @@ struct EthercatDemoOptions {
 /// The second half of the demonstration: eight drives and a MainDevice on loopback, one run for
 /// each way to keep the cycle in phase with their clock.
 struct EthercatDemo {
-  std::unique_ptr<LocalSegment> segment;
-  std::vector<std::unique_ptr<MainRunner>> runs;  ///< FTCS first
+  std::unique_ptr<daemon::LocalSegment> segment;
+  std::vector<std::unique_ptr<daemon::MainRunner>> runs;  ///< FTCS first
   platform::RealtimeSetup setup;
 
-  [[nodiscard]] std::vector<const MainRunner*> views() const;
+  [[nodiscard]] std::vector<const daemon::MainRunner*> views() const;
 };
 
 /// Says on standard error what went wrong, and returns nothing then.

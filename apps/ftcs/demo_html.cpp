@@ -42,7 +42,7 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
                          lock_text(*result));
   }
   if (ethercat != nullptr && !ethercat->runs.empty()) {
-    const MainRunner& run = *ethercat->runs.front();
+    const daemon::MainRunner& run = *ethercat->runs.front();
     const double intervals = static_cast<double>(run.figures().lock_cycle) /
                              static_cast<double>(run.options().servo.cycles_per_sync);
     figures.emplace_back(fmt::format("EtherCAT, {}: locked after", run.options().servo_name),

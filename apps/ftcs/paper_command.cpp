@@ -9,11 +9,11 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/ethercat/contour_live.h"
 #include "apps/ftcs/experiment_files.h"
 #include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/progress.h"
+#include "ftcs/daemon/ethercat/contour_live.h"
 #include "ftcs/report/cycle_report.h"
 #include "ftcs/report/paper_report.h"
 
@@ -91,7 +91,7 @@ int reproduce_section5(const PaperOptions& options) {
     experiment::add_contour(result, experiment::run_contours({}, 1, control));
   }
   if (options.live && !interrupt.flag()) {
-    auto live = run_live_contours([&interrupt] { return interrupt.flag().load(); });
+    auto live = daemon::run_live_contours([&interrupt] { return interrupt.flag().load(); });
     if (!live) return kRuntimeError;
     result.live_contour = std::move(*live);
   }

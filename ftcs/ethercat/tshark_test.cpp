@@ -37,7 +37,7 @@ class Capture {
   Capture(const Capture&) = delete;
   Capture& operator=(const Capture&) = delete;
   [[nodiscard]] std::string path() const { return (folder_ / "capture.pcap").string(); }
-  void add(LocalTime time, ConstBytes packet) {
+  void add(FreeRunningTime time, ConstBytes packet) {
     const std::int64_t ns = time.since_epoch().floor_ns();
     put32(static_cast<std::uint32_t>(ns / 1'000'000'000));
     put32(static_cast<std::uint32_t>(ns % 1'000'000'000 / 1000));
@@ -98,7 +98,7 @@ INSTANTIATE_TEST_SUITE_P(Encapsulation, Tshark, ::testing::Values(false, true),
 
 /// Every frame of the bench, both directions, as this encapsulation has it.
 void record(test::MainBench& bench, Capture& capture, bool udp) {
-  bench.capture = [&capture, udp](LocalTime time, ConstBytes frame) {
+  bench.capture = [&capture, udp](FreeRunningTime time, ConstBytes frame) {
     if (udp) {
       capture.add(time, in_udp(frame));
       return;

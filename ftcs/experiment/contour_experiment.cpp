@@ -7,25 +7,20 @@
 #include <memory>
 #include <numbers>
 
-#include "ftcs/ethercat/maindevice/circle_path.h"
-#include "ftcs/ethercat/maindevice/csp_axis.h"
-#include "ftcs/ethercat/maindevice/main_device.h"
-#include "ftcs/ethercat/subdevice/segment.h"
+#include "ftcs/sim/cycle_host.h"
+#include "ftcs/sim/drives/segment.h"
 #include "ftcs/sim/random.h"
 
 namespace ftcs::experiment {
 
 namespace {
 
-using ethercat::MainDevice;
 using ethercat::WireTime;
 
 constexpr Nanoseconds kCycle{1'000'000};
 constexpr std::size_t kAxes = 2;
-constexpr Nanoseconds kBringUpRoundTrip{20'000};
-constexpr Nanoseconds kReplyTime{60'000};
 /// 0x10F1:02 as a drive has it: two windows missed in a row are too many.
-constexpr std::uint32_t kOwnLimit = 4;
+constexpr std::uint16_t kOwnLimit = 4;
 
 constexpr std::array<std::pair<const char*, CycleLaw>, 4> kLaws{
     {{"no sync", CycleLaw::kNone},
@@ -33,30 +28,24 @@ constexpr std::array<std::pair<const char*, CycleLaw>, 4> kLaws{
      {"FTCS", CycleLaw::kFtcs},
      {"adaptive", CycleLaw::kAdaptive}}};
 
-CycleServoConfig servo_config(CycleLaw law) {
-  CycleServoConfig config;
-  config.law = law;
-  config.cycle = kCycle;
+node::CycleNodeConfig node_config(const ContourWorld& world, CycleLaw law, std::uint16_t limit) {
+  node::CycleNodeConfig config;
+  config.servo.law = law;
+  config.servo.cycle = kCycle;
+  config.sync_error_limit = limit;
+  config.axes.radius = world.radius_um;
+  config.axes.turn_s = world.turn_s;
   return config;
 }
 
-/// Two drives, a MainDevice, a host that is late; in simulated time.
+/// Two drives and a host that is late, in simulated time.
 class Machine {
  public:
-  Machine(const ContourWorld& world, CycleLaw law, std::uint64_t seed, std::uint32_t limit)
+  Machine(const ContourWorld& world, CycleLaw law, std::uint64_t seed, std::uint16_t limit)
       : world_(world),
         lateness_(seed, "lateness"),
-        servo_(servo_config(law)),
-        path_(world.radius_um, world.turn_s) {
-    const auto objects = ethercat::csp_objects(kCycle);
-    objects_.assign(objects.begin(), objects.end());
-    objects_.push_back({{0x10F1, 2}, 2, limit});
-    ethercat::MainDeviceConfig config;
-    config.process.objects = objects_;
-    config.process.cycle = kCycle;
-    config.process.sync0_shift = kCycle / 2;
-    main_ = std::make_unique<MainDevice>(config);
-    segment_ = std::make_unique<ethercat::Segment>();
+        segment_(std::make_unique<ethercat::Segment>()),
+        host_(node_config(world, law, limit), *segment_, WireTime::from_ns(1'000'000)) {
     crystals_[0].set_rate(Rate::from_ppm(world.reference_ppm), WireTime{});
     crystals_[1].set_rate(Rate::from_ppm(world.other_ppm), WireTime{});
     for (std::size_t n = 0; n < kAxes; ++n) {
@@ -65,34 +54,14 @@ class Machine {
   }
 
   /// False: it did not come to the cyclic stage.
-  [[nodiscard]] bool bring_up() {
-    constexpr int kMostFrames = 100'000;
-    for (int i = 0; i < kMostFrames && !main_->cyclic(); ++i) {
-      if (main_->stage() == ethercat::Stage::kStopped) return false;
-      exchange();
-      now_ = now_ + kBringUpRoundTrip;
-    }
-    decision_ = servo_.start(host());
-    return main_->cyclic();
-  }
+  [[nodiscard]] bool bring_up() { return host_.bring_up(); }
 
   void cycle() {
     constexpr double kLeast_us = 20.0;
     constexpr double kMost_us = 200.0;
     const double late_us =
         std::min(kLeast_us + world_.mean_lateness_us * lateness_.exponential(), kMost_us);
-    const FreeRunningTime start = decision_.wake + Duration::from_ns(late_us * 1e3);
-    now_ = WireTime{start.since_epoch()};
-    move();
-    CycleSample sample;
-    sample.sent = start;
-    const bool answered = exchange();
-    sample.has_reference = answered && main_->last_cycle().has_reference;
-    sample.reference = main_->last_cycle().reference;
-    decision_ = servo_.update(sample, start + Duration{kReplyTime});
-    ++cycles_;
-    if (cycles_ == kCyclesToOp) main_->request_operational();
-    if (main_->last_cycle().all_operational()) in_op_ = true;
+    host_.cycle(Duration::from_ns(late_us * 1e3));
   }
 
   /// Off the circle that the position loops draw with perfect timing, um.
@@ -112,10 +81,6 @@ class Machine {
   }
 
  private:
-  /// FTCS knows the rate after one interval of 500 cycles.
-  static constexpr std::uint64_t kCyclesToOp = 1200;
-
-  [[nodiscard]] FreeRunningTime host() const { return FreeRunningTime{now_.since_epoch()}; }
   [[nodiscard]] std::uint64_t sum(std::uint64_t ethercat::SyncStatistics::*field) const {
     std::uint64_t result = 0;
     for (std::size_t n = 0; n < kAxes; ++n) {
@@ -123,46 +88,12 @@ class Machine {
     }
     return result;
   }
-  bool exchange() {
-    const ethercat::ConstBytes frame = main_->next_frame();
-    if (frame.empty()) return false;
-    std::copy(frame.begin(), frame.end(), buffer_.begin());
-    const ethercat::Bytes bytes = ethercat::Bytes{buffer_}.first(frame.size());
-    const auto view = ethercat::FrameView::parse(bytes);
-    if (!view) return false;
-    const auto passage = segment_->pass(*view, now_);
-    const LocalTime sent{now_.since_epoch()};
-    const auto outcome = main_->on_frame(bytes, {sent, LocalTime{passage.at.since_epoch()}});
-    return outcome != ethercat::FrameOutcome::kIgnored;
-  }
-  void move() {
-    const bool all = axes_[0].state() == ethercat::AxisState::kEnabled &&
-                     axes_[1].state() == ethercat::AxisState::kEnabled;
-    path_.advance(in_op_ && all, servo_.next_trigger().local.since_epoch().seconds());
-    for (std::size_t n = 0; n < kAxes; ++n) {
-      const bool enabled = axes_[n].state() == ethercat::AxisState::kEnabled;
-      axes_[n]
-          .cycle(ethercat::csp::Inputs::decode(main_->inputs(n)),
-                 {.enable = in_op_ && (enabled || path_.at_rest()),
-                  .displacement = path_.displacement(n)})
-          .encode(main_->outputs(n));
-    }
-  }
 
   const ContourWorld& world_;
   sim::RandomStream lateness_;
-  CycleServo servo_;
-  ethercat::CirclePath path_;
-  std::vector<ethercat::SdoDownload> objects_;
-  std::unique_ptr<MainDevice> main_;
   std::unique_ptr<ethercat::Segment> segment_;
   std::array<ethercat::AffineOscillator, kAxes> crystals_;
-  std::array<ethercat::CspAxis, kAxes> axes_;
-  std::array<std::uint8_t, ethercat::kMaxFrameSize> buffer_{};
-  WireTime now_ = WireTime::from_ns(1'000'000);
-  CycleDecision decision_;
-  std::uint64_t cycles_ = 0;
-  bool in_op_ = false;
+  sim::CycleHost host_;
 };
 
 int cycles_in(double seconds) {

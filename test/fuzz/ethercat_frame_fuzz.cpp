@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "ftcs/ethercat/subdevice/segment.h"
+#include "ftcs/sim/drives/segment.h"
 #include "test/fuzz/require.h"
 
 namespace {

@@ -17,10 +17,10 @@ TEST_P(CycleOfDrives, stays_in_phase_and_in_op_without_a_missed_window) {
     ASSERT_LT(std::abs(true_error()), 1000.0);
   }
   expect_all_in_op();
-  EXPECT_EQ(bench_.main().counters().wrong_working_counter, 0U);
+  EXPECT_EQ(main().counters().wrong_working_counter, 0U);
   for (std::size_t n = 0; n < 8; ++n) {
-    EXPECT_EQ(bench_.segment()[n].drive().statistics().missed, 0U);
-    EXPECT_LT(std::abs(bench_.segment()[n].system_time_difference()), 100);
+    EXPECT_EQ(segment()[n].drive().statistics().missed, 0U);
+    EXPECT_LT(std::abs(segment()[n].system_time_difference()), 100);
   }
 }
 

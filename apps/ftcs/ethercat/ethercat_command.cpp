@@ -5,11 +5,12 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/ethercat/cycle_laws.h"
-#include "apps/ftcs/ethercat/main_runner.h"
 #include "apps/ftcs/ethercat/run_html.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/daemon/ethercat/cycle_laws.h"
+#include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/daemon/ethercat/run_report.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/report/write_file.h"
 
@@ -18,7 +19,7 @@ namespace ftcs::app {
 namespace {
 
 struct EthercatArguments {
-  RunOptions options;
+  daemon::RunOptions options;
   std::string udp;
   std::string servo = "ftcs";
   std::string cycle = "1ms";
@@ -30,6 +31,7 @@ struct EthercatArguments {
   std::string gate = "200us";
   std::string lock = "5us";
   std::string spin = "0";
+  std::string lock_policy = "recovering";
   std::vector<double> gains;
   bool slew = false;
 };
@@ -46,7 +48,7 @@ Wrong read(const char* flag, const std::string& text, std::int64_t lowest, Nanos
 
 Wrong read_law(EthercatArguments& arguments) {
   CycleServoConfig& servo = arguments.options.servo;
-  set_cycle_law(arguments.options, arguments.servo);
+  daemon::set_cycle_law(arguments.options, arguments.servo);
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
     return "--gains: two numbers, as in 1,1";
@@ -56,8 +58,13 @@ Wrong read_law(EthercatArguments& arguments) {
   return std::nullopt;
 }
 
+node::LockPolicy policy_of(const std::string& name) {
+  if (name == "advisory") return node::LockPolicy::kAdvisory;
+  return name == "fatal" ? node::LockPolicy::kFatal : node::LockPolicy::kRecovering;
+}
+
 Wrong complete(EthercatArguments& arguments) {
-  RunOptions& options = arguments.options;
+  daemon::RunOptions& options = arguments.options;
   CycleServoConfig& servo = options.servo;
   if (!arguments.udp.empty()) {
     const std::size_t colon = arguments.udp.rfind(':');
@@ -89,10 +96,11 @@ Wrong complete(EthercatArguments& arguments) {
   servo.cycles_per_sync =
       static_cast<std::uint32_t>(std::max<std::int64_t>(1, interval / servo.cycle));
   servo.align_at_start = !arguments.slew;
+  options.lock_policy = policy_of(arguments.lock_policy);
   return read_law(arguments);
 }
 
-Result<platform::EthercatLink, platform::OsError> open_link(const RunOptions& options) {
+Result<platform::EthercatLink, platform::OsError> open_link(const daemon::RunOptions& options) {
   return options.interface.empty() ? platform::EthercatLink::connect_udp(options.host, options.port)
                                    : platform::EthercatLink::open_raw(options.interface);
 }
@@ -102,10 +110,10 @@ int end_with(const std::string& message, int exit_code) {
   return exit_code;
 }
 
-int end_with(const ethercat::Failure& failure, const RunOptions& options) {
+int end_with(const ethercat::Failure& failure, const daemon::RunOptions& options) {
   if (!failure) return end_with("stopped by a signal before the first cycle", kNotLocked);
   if (failure.kind != ethercat::FailureKind::kNoReply) {
-    return end_with(describe(failure), kRuntimeError);
+    return end_with(daemon::describe(failure), kRuntimeError);
   }
   const std::string where =
       options.interface.empty()
@@ -113,10 +121,10 @@ int end_with(const ethercat::Failure& failure, const RunOptions& options) {
                         options.port)
           : fmt::format("on interface {}: is a SubDevice with power connected to it?",
                         options.interface);
-  return end_with(fmt::format("{} {}", describe(failure), where), kRuntimeError);
+  return end_with(fmt::format("{} {}", daemon::describe(failure), where), kRuntimeError);
 }
 
-using Body = int (*)(MainRunner& runner, const std::function<bool()>& stop);
+using Body = int (*)(daemon::MainRunner& runner, const std::function<bool()>& stop);
 
 /// What scan and run begin with: flags checked, link open.
 int with_runner(EthercatArguments arguments, Body body) {
@@ -124,17 +132,17 @@ int with_runner(EthercatArguments arguments, Body body) {
   auto link = open_link(arguments.options);
   if (!link) return end_with(link.error().message(), kRuntimeError);
   const platform::StopFlag stop_flag;
-  const auto runner = std::make_unique<MainRunner>(arguments.options, std::move(*link));
+  const auto runner = std::make_unique<daemon::MainRunner>(arguments.options, std::move(*link));
   return body(*runner, [&stop_flag] { return stop_flag.is_set(); });
 }
 
-int run_scan(MainRunner& runner, const std::function<bool()>& stop) {
+int run_scan(daemon::MainRunner& runner, const std::function<bool()>& stop) {
   if (!runner.bring_up(stop, true)) return end_with(runner.main().failure(), runner.options());
-  print_scan(runner.main());
+  daemon::print_scan(runner.main());
   return kSuccess;
 }
 
-void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options) {
+void print_setup(const platform::RealtimeSetup& setup, const daemon::RunOptions& options) {
   const auto got = [](bool obtained) { return obtained ? "obtained" : "refused"; };
   fmt::print("SCHED_FIFO {} {}, mlockall {}, pinned to a processor {}, no sleep states {}\n",
              options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
@@ -146,27 +154,27 @@ void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options
   }
 }
 
-std::optional<WriteError> write_reports(const MainRunner& runner) {
-  const RunOptions& options = runner.options();
+std::optional<WriteError> write_reports(const daemon::MainRunner& runner) {
+  const daemon::RunOptions& options = runner.options();
   if (!options.json.empty()) {
-    if (auto error = write_file(options.json, dump(run_json(runner)))) return error;
+    if (auto error = write_file(options.json, dump(daemon::run_json(runner)))) return error;
   }
   if (options.html.empty()) return std::nullopt;
-  const MainRunner* const runs[] = {&runner};
+  const daemon::MainRunner* const runs[] = {&runner};
   HtmlReport report("EtherCAT: a cycle that follows the distributed clock", options.servo_name);
   add_run_sections(report, runs);
   return write_file(options.html, report.render());
 }
 
-int run_main(MainRunner& runner, const std::function<bool()>& stop) {
-  const RunOptions& options = runner.options();
+int run_main(daemon::MainRunner& runner, const std::function<bool()>& stop) {
+  const daemon::RunOptions& options = runner.options();
   if (!can_write_results({options.json, options.html})) return kRuntimeError;
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
   runner.run(stop);
-  if (!options.quiet) print_run(runner);
+  if (!options.quiet) daemon::print_run(runner);
   // The figures are written even if a record is cut short, and whatever ended the run.
   const auto reports = write_reports(runner);
   const auto csv = runner.finish_csv();
@@ -174,7 +182,10 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   if (reports) end_with(reports->message, kRuntimeError);
   if (runner.main().failure()) return end_with(runner.main().failure(), options);
   if (csv || reports) return kRuntimeError;
-  return runner.decision().state == CycleState::kLocked ? kSuccess : kNotLocked;
+  if (runner.decision().state != CycleState::kLocked) return kNotLocked;
+  if (runner.main().last_cycle().all_operational()) return kSuccess;
+  return end_with("not every drive was in OP at the end: the lines above and --json tell which",
+                  kNotLocked);
 }
 
 void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
@@ -186,10 +197,10 @@ void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
 }
 
 void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
-  RunOptions& options = arguments.options;
+  daemon::RunOptions& options = arguments.options;
   command.add_option("--servo", arguments.servo, "ftcs (default), pics, adaptive, soem-pi or none")
-      ->check(CLI::IsMember(
-          std::vector<std::string>(cycle_law_names().begin(), cycle_law_names().end())));
+      ->check(CLI::IsMember(std::vector<std::string>(daemon::cycle_law_names().begin(),
+                                                     daemon::cycle_law_names().end())));
   command.add_option("--cycle", arguments.cycle, "default 1ms");
   command.add_option("--sync-interval", arguments.sync_interval,
                      "ftcs and pics act once in this time; default 500ms");
@@ -227,6 +238,20 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
       .add_option("--unlocked-limit", options.unlocked_limit_s,
                   "seconds without the lock, once it was there, that stop the drives; default 10")
       ->check(CLI::Range(0.1, 1e6));
+  command
+      .add_option("--lock-policy", arguments.lock_policy,
+                  "what a lost lock does: advisory (told), recovering (default: stops the drives "
+                  "after --unlocked-limit) or fatal (stops them at once)")
+      ->check(CLI::IsMember({"advisory", "recovering", "fatal"}));
+  command
+      .add_option("--await-lock", options.await_lock_s,
+                  "seconds that the drives wait in SAFEOP for the first lock; default 0, for ever")
+      ->check(CLI::Range(0.0, 1e6));
+  command
+      .add_option(
+          "--reset-faults", options.fault_resets,
+          "so often the fault of a drive is reset; default 0: it stays until somebody looks")
+      ->check(CLI::Range(0, 1'000'000));
   command
       .add_option("--ride-through", options.ride_through_s,
                   "seconds in which drives may be out of reach before the rest is stopped")

@@ -5,40 +5,42 @@
 
 #include <fmt/format.h>
 
-#include "apps/ftcs/ethercat/run_histograms.h"
 #include "apps/ftcs/live_view.h"
+#include "ftcs/daemon/ethercat/run_histograms.h"
+#include "ftcs/daemon/ethercat/run_report.h"
 
 namespace ftcs::app {
 
 namespace {
 
-PlotSeries over_time(const MainRunner& run, float RunPoint::*field) {
+PlotSeries over_time(const daemon::MainRunner& run, float experiment::CyclePoint::*field) {
   PlotSeries series;
   series.name = run.options().servo_name;
-  for (const RunPoint& point : run.figures().trace) {
+  for (const experiment::CyclePoint& point : run.figures().trace) {
     series.x.push_back(static_cast<double>(point.time_s));
     series.y.push_back(static_cast<double>(point.*field));
   }
   return series;
 }
 
-Plot time_plot(std::span<const MainRunner* const> runs, const char* title, const char* label,
-               float RunPoint::*field) {
+Plot time_plot(std::span<const daemon::MainRunner* const> runs, const char* title,
+               const char* label, float experiment::CyclePoint::*field) {
   Plot plot;
   plot.title = title;
   plot.x_label = "s";
   plot.y_label = label;
-  for (const MainRunner* run : runs) plot.series.push_back(over_time(*run, field));
+  for (const daemon::MainRunner* run : runs) plot.series.push_back(over_time(*run, field));
   return plot;
 }
 
-Plot histogram_plot(const MainRunner& run, const char* title, float RunPoint::*field) {
+Plot histogram_plot(const daemon::MainRunner& run, const char* title,
+                    float experiment::CyclePoint::*field) {
   Plot plot;
   plot.title = fmt::format("{}, {}", title, run.options().servo_name);
   plot.x_label = "us";
   plot.y_label = "cycles";
   plot.style = PlotStyle::kFilledSteps;
-  const Histogram bins = run_histogram(run.figures(), field);
+  const Histogram bins = daemon::run_histogram(run.figures(), field);
   if (bins.counts.empty()) return plot;
   plot.series.push_back(histogram_series("cycles", bins, 1.0));
   plot.note = fmt::format("{} cycles lie outside.", bins.below + bins.above);
@@ -46,26 +48,27 @@ Plot histogram_plot(const MainRunner& run, const char* title, float RunPoint::*f
 }
 
 /// What happened on the way, of all runs: locks, drives that left OP and came back.
-Table events_table(std::span<const MainRunner* const> runs) {
+Table events_table(std::span<const daemon::MainRunner* const> runs) {
   Table table({"servo", "s", "drive", "what", "AL status code"});
-  for (const MainRunner* run : runs) {
-    for (const RunEvent& event : run->figures().events) {
-      const bool coded = event.code != ethercat::AlStatusCode::kNoError;
-      table.add_row({run->options().servo_name, Cell::fixed(event.time_s, 3),
-                     event.drive == RunEvent::kNobody ? Cell{"-"} : Cell::count(event.drive),
-                     name(event.kind),
-                     coded ? fmt::format("0x{:04X} {}", static_cast<unsigned>(event.code),
-                                         ethercat::name(event.code))
-                           : "-"});
+  for (const daemon::MainRunner* run : runs) {
+    for (const experiment::CycleEvent& event : run->figures().events) {
+      const bool coded = event.note.code != ethercat::AlStatusCode::kNoError;
+      table.add_row(
+          {run->options().servo_name, Cell::fixed(event.time_s, 3),
+           event.note.drive == node::CycleNote::kNobody ? Cell{"-"} : Cell::count(event.note.drive),
+           daemon::name(event.note.kind),
+           coded ? fmt::format("0x{:04X} {}", static_cast<unsigned>(event.note.code),
+                               ethercat::name(event.note.code))
+                 : "-"});
     }
   }
   return table;
 }
 
-std::string relock_text(std::span<const MainRunner* const> runs) {
+std::string relock_text(std::span<const daemon::MainRunner* const> runs) {
   std::string text;
-  for (const MainRunner* run : runs) {
-    const RunFigures& figures = run->figures();
+  for (const daemon::MainRunner* run : runs) {
+    const experiment::CycleFigures& figures = run->figures();
     text += fmt::format("{}: lock lost {} times, longest way back {} cycles. ",
                         run->options().servo_name, figures.lock.losses(),
                         figures.lock.longest_relock());
@@ -81,12 +84,12 @@ std::string pair_of(const QuantileSketch& sketch) {
 
 }  // namespace
 
-Table runs_table(std::span<const MainRunner* const> runs) {
+Table runs_table(std::span<const daemon::MainRunner* const> runs) {
   Table table({"servo", "locked", "cycles to lock", "sync intervals", "virtual phase p50 / p99",
                "frame itself p50 / p99", "working counter right", "lost", "stalls", "excluded",
                "|0x092C|"});
-  for (const MainRunner* run : runs) {
-    const RunFigures& figures = run->figures();
+  for (const daemon::MainRunner* run : runs) {
+    const experiment::CycleFigures& figures = run->figures();
     const bool locked = figures.lock_cycle >= 0;
     const double intervals = static_cast<double>(figures.lock_cycle) /
                              static_cast<double>(run->options().servo.cycles_per_sync);
@@ -109,7 +112,7 @@ Table runs_table(std::span<const MainRunner* const> runs) {
   return table;
 }
 
-void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> runs) {
+void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* const> runs) {
   report.add_table(
       "EtherCAT: the cycle and its reference", runs_table(runs),
       "Virtual phase: the cycle as scheduled against SYNC0's grid, the sender's lateness (which it "
@@ -117,18 +120,22 @@ void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> run
       "second "
       "half). Cycles later or slower than the gate are "
       "left out; their share is \"excluded\". |0x092C| from one second after the lock.");
-  report.add_plot(
-      time_plot(runs, "Phase error of the cycle, early is positive", "us", &RunPoint::phase_us));
+  report.add_plot(time_plot(runs, "Phase error of the cycle, early is positive", "us",
+                            &experiment::CyclePoint::phase_us));
   if (runs.empty()) return;
   report.add_table("EtherCAT: what happened", events_table(runs), relock_text(runs));
-  const MainRunner& first = *runs.front();
-  report.add_plot(histogram_plot(first, "Margin from the frame to SYNC0", &RunPoint::margin_us));
-  report.add_plot(histogram_plot(first, "Lateness of the wake-up", &RunPoint::lateness_us));
-  report.add_plot(histogram_plot(first, "Phase error of the cycle", &RunPoint::phase_us));
-  report.add_plot(histogram_plot(first, "Round trip of the frame", &RunPoint::round_trip_us));
+  const daemon::MainRunner& first = *runs.front();
+  report.add_plot(
+      histogram_plot(first, "Margin from the frame to SYNC0", &experiment::CyclePoint::margin_us));
+  report.add_plot(
+      histogram_plot(first, "Lateness of the wake-up", &experiment::CyclePoint::lateness_us));
+  report.add_plot(
+      histogram_plot(first, "Phase error of the cycle", &experiment::CyclePoint::phase_us));
+  report.add_plot(
+      histogram_plot(first, "Round trip of the frame", &experiment::CyclePoint::round_trip_us));
 }
 
-Table drives_table(const SegmentServer& server) {
+Table drives_table(const daemon::SegmentServer& server) {
   Table table({"drive", "state", "AL status", "|0x092C| / ns", "SYNC0 events", "missed",
                "smallest margin / us", "largest margin / us"});
   const ethercat::Segment& segment = server.segment();

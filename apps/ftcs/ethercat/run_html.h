@@ -3,18 +3,18 @@
 
 #include <span>
 
-#include "apps/ftcs/ethercat/main_runner.h"
-#include "apps/ftcs/ethercat/segment_server.h"
+#include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/daemon/ethercat/segment_server.h"
 #include "ftcs/report/html_report.h"
 #include "ftcs/report/table.h"
 
 namespace ftcs::app {
 
 /// One row for each run: lock, phase, frame, working counter.
-[[nodiscard]] Table runs_table(std::span<const MainRunner* const> runs);
+[[nodiscard]] Table runs_table(std::span<const daemon::MainRunner* const> runs);
 /// Phase over time, histograms of margin, lateness and phase of the first run, one table.
-void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> runs);
+void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* const> runs);
 /// What the drives saw, as the segment knows it.
-[[nodiscard]] Table drives_table(const SegmentServer& server);
+[[nodiscard]] Table drives_table(const daemon::SegmentServer& server);
 
 }  // namespace ftcs::app

@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/ethercat/segment_server.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/daemon/ethercat/segment_server.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {
@@ -16,7 +16,7 @@ namespace ftcs::app {
 namespace {
 
 struct SegmentArguments {
-  SegmentOptions options;
+  daemon::SegmentOptions options;
   std::string udp;
   std::string topology = "line";
   std::string cable;
@@ -27,7 +27,7 @@ struct SegmentArguments {
 };
 
 /// "KIND:DRIVE@SECONDS" or "skew:DRIVE@SECONDS=PPM".
-std::optional<std::string> parse_fault(const std::string& text, SegmentFault& fault) {
+std::optional<std::string> parse_fault(const std::string& text, daemon::SegmentFault& fault) {
   const auto wrong = [&text] {
     return fmt::format(
         "--fault: '{}' is not cut, mend, restart or skew, as in cut:3@2.5 or "
@@ -48,17 +48,17 @@ std::optional<std::string> parse_fault(const std::string& text, SegmentFault& fa
   if (kind == "skew" && equals != std::string::npos) {
     const auto ppm = parse_number(text.substr(equals + 1), -1e5, 1e5);
     if (!ppm) return wrong();
-    fault.kind = SegmentFault::Kind::kSkew;
+    fault.kind = daemon::SegmentFault::Kind::kSkew;
     fault.ppm = *ppm;
     return std::nullopt;
   }
   if (equals != std::string::npos) return wrong();
   if (kind == "cut") {
-    fault.kind = SegmentFault::Kind::kCut;
+    fault.kind = daemon::SegmentFault::Kind::kCut;
   } else if (kind == "mend") {
-    fault.kind = SegmentFault::Kind::kMend;
+    fault.kind = daemon::SegmentFault::Kind::kMend;
   } else if (kind == "restart") {
-    fault.kind = SegmentFault::Kind::kRestart;
+    fault.kind = daemon::SegmentFault::Kind::kRestart;
   } else {
     return wrong();
   }
@@ -66,7 +66,7 @@ std::optional<std::string> parse_fault(const std::string& text, SegmentFault& fa
 }
 
 std::optional<std::string> complete(SegmentArguments& arguments) {
-  SegmentOptions& options = arguments.options;
+  daemon::SegmentOptions& options = arguments.options;
   options.tree = arguments.topology == "tree";
   if (!arguments.udp.empty()) {
     const std::size_t colon = arguments.udp.rfind(':');
@@ -85,7 +85,7 @@ std::optional<std::string> complete(SegmentArguments& arguments) {
     *target = Nanoseconds{value->floor_ns()};
   }
   for (const std::string& text : arguments.faults) {
-    SegmentFault fault;
+    daemon::SegmentFault fault;
     if (auto wrong = parse_fault(text, fault)) return wrong;
     options.faults.push_back(fault);
   }
@@ -97,7 +97,7 @@ int run_segment(SegmentArguments arguments) {
     fmt::print(stderr, "ftcs ethercat-segment: {}\n", *wrong);
     return kUsageError;
   }
-  const SegmentOptions& options = arguments.options;
+  const daemon::SegmentOptions& options = arguments.options;
   if (!can_write_results({options.json})) return kRuntimeError;
   auto link = options.interface.empty()
                   ? platform::EthercatLink::listen_udp(options.address, options.port)
@@ -109,7 +109,7 @@ int run_segment(SegmentArguments arguments) {
   if (arguments.priority > 0) {
     static_cast<void>(platform::make_realtime(arguments.priority, arguments.cpu));
   }
-  SegmentServer server(options, std::move(*link));
+  daemon::SegmentServer server(options, std::move(*link));
   fmt::print("{} drives in a {} on {}\n", options.drives, arguments.topology,
              options.interface.empty() ? fmt::format("UDP {}:{}", options.address, options.port)
                                        : options.interface);
@@ -127,7 +127,7 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand(
       "ethercat-segment", "a software EtherCAT segment of CiA 402 drives with distributed clocks");
   const auto arguments = std::make_shared<SegmentArguments>();
-  SegmentOptions& options = arguments->options;
+  daemon::SegmentOptions& options = arguments->options;
   auto* interface = command->add_option("-i,--interface", options.interface,
                                         "raw Ethernet on this interface (needs CAP_NET_RAW)");
   command->add_option("--udp", arguments->udp, "[ADDRESS:]PORT; default 127.0.0.1:34980")

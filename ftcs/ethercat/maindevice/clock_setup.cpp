@@ -43,7 +43,7 @@ void ClockSetup::next_clock(const Network& network) noexcept {
   } while (device_ < network.count && !network.devices[device_].dc());
 }
 
-Progress ClockSetup::reply(const FrameView& frame, Network& network, LocalTime sent,
+Progress ClockSetup::reply(const FrameView& frame, Network& network, FreeRunningTime sent,
                            Failure& failure) noexcept {
   if (!network.has_reference()) return fail(failure, {.kind = FailureKind::kNoDistributedClock});
   const std::uint16_t counter = frame[0].working_counter();

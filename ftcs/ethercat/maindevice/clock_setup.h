@@ -25,7 +25,7 @@ class ClockSetup {
  public:
   void start(const ClockSetupConfig& config) noexcept;
   void request(FrameWriter& writer, const Network& network) noexcept;
-  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime sent,
+  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime sent,
                                Failure& failure) noexcept;
   [[nodiscard]] std::uint32_t pulses_left() const noexcept { return pulses_left_; }
 
@@ -37,7 +37,7 @@ class ClockSetup {
   ClockSetupConfig config_;
   Step step_ = Step::kLatch;
   std::size_t device_ = 0;
-  LocalTime latched_;
+  FreeRunningTime latched_;
   std::uint32_t pulses_left_ = 0;
 };
 

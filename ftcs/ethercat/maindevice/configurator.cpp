@@ -180,7 +180,7 @@ void Configurator::plan_sync0(ConstBytes system_time) noexcept {
       (earliest / cycle + 1) * cycle + static_cast<std::uint64_t>(config_.sync0_shift.count());
 }
 
-Progress Configurator::reply(const FrameView& frame, Network& network, LocalTime now,
+Progress Configurator::reply(const FrameView& frame, Network& network, FreeRunningTime now,
                              Failure& failure) noexcept {
   SubDeviceInfo& device = network.devices[device_];
   Progress progress = Progress::kDone;
@@ -210,7 +210,7 @@ Progress Configurator::reply(const FrameView& frame, Network& network, LocalTime
 }
 
 Progress Configurator::await(const FrameView& frame, SubDeviceInfo& device, AlState wanted,
-                             LocalTime now, Failure& failure) noexcept {
+                             FreeRunningTime now, Failure& failure) noexcept {
   if (frame[0].working_counter() == 1) device.set_al_status(frame[0].data());
   if (device.state == wanted && !device.error) return Progress::kDone;
   if (!deadline_set_) deadline_ = now + config_.state_timeout;
@@ -224,7 +224,8 @@ Progress Configurator::await(const FrameView& frame, SubDeviceInfo& device, AlSt
                .code = device.code});
 }
 
-Progress Configurator::objects(const FrameView& frame, LocalTime now, Failure& failure) noexcept {
+Progress Configurator::objects(const FrameView& frame, FreeRunningTime now,
+                               Failure& failure) noexcept {
   const Progress progress = sdo_.reply(frame, device_, now, failure);
   if (progress == Progress::kFailed && can_do_without(config_.objects[object_], failure)) {
     failure = Failure{};
@@ -282,7 +283,7 @@ bool Configurator::walk(std::uint32_t value) noexcept {
   return false;
 }
 
-Progress Configurator::sizes(const FrameView& frame, SubDeviceInfo& device, LocalTime now,
+Progress Configurator::sizes(const FrameView& frame, SubDeviceInfo& device, FreeRunningTime now,
                              Failure& failure) noexcept {
   const Progress progress = sdo_.reply(frame, device_, now, failure);
   if (progress != Progress::kDone) return progress;

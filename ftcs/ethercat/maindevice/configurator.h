@@ -38,7 +38,7 @@ class Configurator {
   /// Sync managers and FMMUs of all that are concerned have been written.
   [[nodiscard]] bool channels_done() const noexcept { return step_ > Step::kChannels; }
   void request(FrameWriter& writer, const Network& network) noexcept;
-  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime now,
+  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime now,
                                Failure& failure) noexcept;
   /// System time of the first SYNC0; zero if there is none.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return sync0_start_; }
@@ -76,9 +76,10 @@ class Configurator {
   void write_channels(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
   void write_sync0(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
   [[nodiscard]] Progress await(const FrameView& frame, SubDeviceInfo& device, AlState wanted,
-                               LocalTime now, Failure& failure) noexcept;
-  [[nodiscard]] Progress objects(const FrameView& frame, LocalTime now, Failure& failure) noexcept;
-  [[nodiscard]] Progress sizes(const FrameView& frame, SubDeviceInfo& device, LocalTime now,
+                               FreeRunningTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress objects(const FrameView& frame, FreeRunningTime now,
+                                 Failure& failure) noexcept;
+  [[nodiscard]] Progress sizes(const FrameView& frame, SubDeviceInfo& device, FreeRunningTime now,
                                Failure& failure) noexcept;
   [[nodiscard]] bool walk(std::uint32_t value) noexcept;
   [[nodiscard]] ObjectAddress walk_object() const noexcept;
@@ -94,7 +95,7 @@ class Configurator {
   std::size_t object_ = 0;
   SdoClient sdo_;
   MappingWalk walk_;
-  LocalTime deadline_;
+  FreeRunningTime deadline_;
   bool deadline_set_ = false;
   std::uint64_t sync0_start_ = 0;
 };

@@ -45,6 +45,8 @@ const char* name(FailureKind kind) noexcept {
       return "working counter wrong";
     case FailureKind::kSyncLost:
       return "cycle out of sync with the reference";
+    case FailureKind::kNeverLocked:
+      return "cycle never in phase with the reference";
     case FailureKind::kLinkLost:
       return "frames lost";
   }

@@ -30,6 +30,7 @@ enum class FailureKind : std::uint8_t {
   kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received
   kSyncLost,              ///< the cycle does not follow the reference any more
+  kNeverLocked,           ///< the cycle did not find the reference's phase in time
   kLinkLost,              ///< too many lost frames in a row
 };
 [[nodiscard]] const char* name(FailureKind kind) noexcept;

@@ -160,7 +160,7 @@ void MainDevice::write_reintegration(FrameWriter& writer) noexcept {
               .expected = static_cast<std::uint16_t>(writer.room())});
 }
 
-void MainDevice::reintegrate(const FrameView& frame, LocalTime now) noexcept {
+void MainDevice::reintegrate(const FrameView& frame, FreeRunningTime now) noexcept {
   const std::size_t position = reintegrator_.position();
   Failure failure;
   const Progress progress = reintegrator_.reply(frame, network_, cycle_.reference, now, failure);

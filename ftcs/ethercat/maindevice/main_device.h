@@ -45,8 +45,8 @@ enum class Stage : std::uint8_t {
 
 /// When a frame went out and came back, on the MainDevice's clock.
 struct FrameStamps {
-  LocalTime sent;
-  LocalTime received;
+  FreeRunningTime sent;
+  FreeRunningTime received;
 };
 
 enum class FrameOutcome : std::uint8_t {
@@ -122,7 +122,7 @@ class MainDevice {
   [[nodiscard]] bool answers(const FrameView& frame) const noexcept;
   FrameOutcome advance(Progress progress) noexcept;
   void write_reintegration(FrameWriter& writer) noexcept;
-  void reintegrate(const FrameView& frame, LocalTime now) noexcept;
+  void reintegrate(const FrameView& frame, FreeRunningTime now) noexcept;
   void keep_members() noexcept;
   FrameOutcome finish_cycle() noexcept;
   void begin_stop(const Failure& failure) noexcept;

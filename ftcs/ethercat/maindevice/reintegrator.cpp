@@ -93,14 +93,14 @@ void Reintegrator::request(FrameWriter& writer, const Network& network) noexcept
   }
 }
 
-bool Reintegrator::expired(LocalTime now, Nanoseconds limit) noexcept {
+bool Reintegrator::expired(FreeRunningTime now, Nanoseconds limit) noexcept {
   if (!deadline_set_) deadline_ = now + limit;
   deadline_set_ = true;
   return now >= deadline_;
 }
 
-Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& device, LocalTime now,
-                                  Failure& failure) noexcept {
+Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& device,
+                                  FreeRunningTime now, Failure& failure) noexcept {
   device.set_al_status(datagram.data());
   if (device.state == AlState::kInit && !device.error) {
     enter(Step::kIdentity);
@@ -116,7 +116,7 @@ Progress Reintegrator::await_init(const Datagram& datagram, SubDeviceInfo& devic
                         .code = device.code});
 }
 
-Progress Reintegrator::identify(const FrameView& frame, const Network& network, LocalTime now,
+Progress Reintegrator::identify(const FrameView& frame, const Network& network, FreeRunningTime now,
                                 Failure& failure) noexcept {
   ConstBytes words;
   const Progress progress = sii_reader_.reply(frame, position_, now, words, failure);
@@ -141,7 +141,8 @@ Progress Reintegrator::identify(const FrameView& frame, const Network& network, 
   return Progress::kContinue;
 }
 
-Progress Reintegrator::settle(const Datagram& datagram, LocalTime now, Failure& failure) noexcept {
+Progress Reintegrator::settle(const Datagram& datagram, FreeRunningTime now,
+                              Failure& failure) noexcept {
   const std::uint32_t difference = load<std::uint32_t>(datagram.data(), 0) & kMagnitude;
   steady_ = difference < kSteadyDifference ? steady_ + 1 : 0;
   if (steady_ >= kSteadyFrames) {
@@ -159,7 +160,7 @@ void Reintegrator::begin_configuration() noexcept {
 }
 
 Progress Reintegrator::reply(const FrameView& frame, Network& network, ReferenceTime reference,
-                             LocalTime now, Failure& failure) noexcept {
+                             FreeRunningTime now, Failure& failure) noexcept {
   SubDeviceInfo& device = network.devices[position_];
   if (step_ == Step::kConfigure) {
     const Progress progress = configurator_.reply(frame, network, now, failure);

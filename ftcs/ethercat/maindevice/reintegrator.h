@@ -36,7 +36,7 @@ class Reintegrator {
   /// `frame`: the own datagrams alone. `reference`: what the frame's drift datagram brought; zero:
   /// nothing.
   [[nodiscard]] Progress reply(const FrameView& frame, Network& network, ReferenceTime reference,
-                               LocalTime now, Failure& failure) noexcept;
+                               FreeRunningTime now, Failure& failure) noexcept;
 
  private:
   enum class Step : std::uint8_t {
@@ -51,12 +51,13 @@ class Reintegrator {
     kSettle,
     kConfigure,
   };
-  [[nodiscard]] Progress await_init(const Datagram& datagram, SubDeviceInfo& device, LocalTime now,
-                                    Failure& failure) noexcept;
-  [[nodiscard]] Progress identify(const FrameView& frame, const Network& network, LocalTime now,
-                                  Failure& failure) noexcept;
-  [[nodiscard]] Progress settle(const Datagram& datagram, LocalTime now, Failure& failure) noexcept;
-  [[nodiscard]] bool expired(LocalTime now, Nanoseconds limit) noexcept;
+  [[nodiscard]] Progress await_init(const Datagram& datagram, SubDeviceInfo& device,
+                                    FreeRunningTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress identify(const FrameView& frame, const Network& network,
+                                  FreeRunningTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress settle(const Datagram& datagram, FreeRunningTime now,
+                                Failure& failure) noexcept;
+  [[nodiscard]] bool expired(FreeRunningTime now, Nanoseconds limit) noexcept;
   void enter(Step step) noexcept;
   void begin_configuration() noexcept;
   [[nodiscard]] std::size_t time_source(const Network& network) const noexcept;
@@ -66,7 +67,7 @@ class Reintegrator {
   bool active_ = false;
   std::size_t position_ = 0;
   Step step_ = Step::kAddress;
-  LocalTime deadline_;
+  FreeRunningTime deadline_;
   bool deadline_set_ = false;
   SiiReader sii_reader_;
   std::array<std::uint8_t, 16> identity_{};

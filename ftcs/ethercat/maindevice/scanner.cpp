@@ -64,7 +64,7 @@ void Scanner::request(FrameWriter& writer, const Network& network) noexcept {
   }
 }
 
-Progress Scanner::reply(const FrameView& frame, Network& network, LocalTime now,
+Progress Scanner::reply(const FrameView& frame, Network& network, FreeRunningTime now,
                         Failure& failure) noexcept {
   switch (step_) {
     case Step::kCount:
@@ -119,7 +119,7 @@ Progress Scanner::addressed(const FrameView& frame, Network& network, Failure& f
   return Progress::kContinue;
 }
 
-Progress Scanner::identify(const FrameView& frame, Network& network, LocalTime now,
+Progress Scanner::identify(const FrameView& frame, Network& network, FreeRunningTime now,
                            Failure& failure) noexcept {
   SubDeviceInfo& device = network.devices[device_];
   const ConstBytes identity = frame[0].data();
@@ -156,7 +156,7 @@ Progress Scanner::identify(const FrameView& frame, Network& network, LocalTime n
   return Progress::kContinue;
 }
 
-Progress Scanner::read_sii(const FrameView& frame, Network& network, LocalTime now,
+Progress Scanner::read_sii(const FrameView& frame, Network& network, FreeRunningTime now,
                            Failure& failure) noexcept {
   ConstBytes words;
   const Progress progress = sii_reader_.reply(frame, device_, now, words, failure);

@@ -17,7 +17,7 @@ class Scanner {
   /// `expected`: how many there must be at least; zero: any number.
   void start(std::size_t expected, Nanoseconds timeout) noexcept;
   void request(FrameWriter& writer, const Network& network) noexcept;
-  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, LocalTime now,
+  [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime now,
                                Failure& failure) noexcept;
 
  private:
@@ -25,9 +25,9 @@ class Scanner {
   [[nodiscard]] Progress count(const FrameView& frame, Network& network, Failure& failure) noexcept;
   [[nodiscard]] Progress addressed(const FrameView& frame, Network& network,
                                    Failure& failure) noexcept;
-  [[nodiscard]] Progress identify(const FrameView& frame, Network& network, LocalTime now,
+  [[nodiscard]] Progress identify(const FrameView& frame, Network& network, FreeRunningTime now,
                                   Failure& failure) noexcept;
-  [[nodiscard]] Progress read_sii(const FrameView& frame, Network& network, LocalTime now,
+  [[nodiscard]] Progress read_sii(const FrameView& frame, Network& network, FreeRunningTime now,
                                   Failure& failure) noexcept;
   [[nodiscard]] Progress next_sii_word(Network& network, Failure& failure) noexcept;
   [[nodiscard]] bool take_from_twin(Network& network) const noexcept;
@@ -44,7 +44,7 @@ class Scanner {
   std::size_t expected_ = 0;
   Nanoseconds timeout_{};
   std::size_t device_ = 0;
-  LocalTime deadline_;
+  FreeRunningTime deadline_;
   bool deadline_set_ = false;
   SiiReader sii_reader_;
   std::array<std::uint8_t, kImageSize> image_{};

@@ -38,7 +38,7 @@ void SdoClient::request(FrameWriter& writer, const SubDeviceInfo& device) noexce
   if (!mailbox.empty()) static_cast<void>(encode_sdo(mailbox, sdo));
 }
 
-Progress SdoClient::reply(const FrameView& frame, std::size_t position, LocalTime now,
+Progress SdoClient::reply(const FrameView& frame, std::size_t position, FreeRunningTime now,
                           Failure& failure) noexcept {
   if (!deadline_set_) deadline_ = now + timeout_;
   deadline_set_ = true;

@@ -25,7 +25,7 @@ class SdoClient {
   void start_download(const SdoDownload& download, Nanoseconds timeout) noexcept;
   void start_upload(ObjectAddress object, Nanoseconds timeout) noexcept;
   void request(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
-  [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, LocalTime now,
+  [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, FreeRunningTime now,
                                Failure& failure) noexcept;
   /// What an upload brought, up to four bytes.
   [[nodiscard]] std::uint32_t value() const noexcept { return value_; }
@@ -37,7 +37,7 @@ class SdoClient {
   SdoKind kind_ = SdoKind::kUploadRequest;
   SdoDownload object_;
   Nanoseconds timeout_{};
-  LocalTime deadline_;
+  FreeRunningTime deadline_;
   bool deadline_set_ = false;
   std::uint8_t counter_ = 0;
   std::uint32_t value_ = 0;

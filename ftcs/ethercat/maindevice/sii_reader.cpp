@@ -20,7 +20,7 @@ void SiiReader::request(FrameWriter& writer, const SubDeviceInfo& device,
   writer.add(device.target(Command::kFprd, reg::kSiiControl), kReplySize);
 }
 
-Progress SiiReader::reply(const FrameView& frame, std::size_t position, LocalTime now,
+Progress SiiReader::reply(const FrameView& frame, std::size_t position, FreeRunningTime now,
                           ConstBytes& words, Failure& failure) noexcept {
   const Datagram answer = frame[poll_ ? 0 : 1];
   const ConstBytes data = answer.data();

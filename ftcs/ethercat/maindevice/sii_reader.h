@@ -20,12 +20,12 @@ class SiiReader {
   /// The words from `word` on.
   void request(FrameWriter& writer, const SubDeviceInfo& device, std::size_t word) const noexcept;
   /// Done: `words` has what came, within the frame; otherwise the same is to be asked again.
-  [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, LocalTime now,
+  [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, FreeRunningTime now,
                                ConstBytes& words, Failure& failure) noexcept;
 
  private:
   Nanoseconds timeout_{};
-  LocalTime deadline_;
+  FreeRunningTime deadline_;
   bool deadline_set_ = false;
   bool poll_ = false;  ///< the command is out, the answer is not there yet
 };

@@ -12,6 +12,7 @@
 #include "ftcs/ethercat/maindevice/csp_profile.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
 #include "ftcs/ethercat/test/wire_bench.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::ethercat::test {
 
@@ -40,7 +41,7 @@ class MainBench : public WireBench {
     }
     if (tamper) tamper(*view);
     if (capture) capture(now_of_master(), ConstBytes{buffer}.first(frame.size()));
-    const FrameStamps stamps{now_of_master(), LocalTime{passage.at.since_epoch()}};
+    const FrameStamps stamps{now_of_master(), relabel<FreeRunningTime>(passage.at)};
     main_->on_frame(Bytes{buffer}.first(frame.size()), stamps);
     return true;
   }
@@ -58,10 +59,10 @@ class MainBench : public WireBench {
       wait(cycle);
     }
   }
-  [[nodiscard]] LocalTime now_of_master() const { return LocalTime{now().since_epoch()}; }
+  [[nodiscard]] FreeRunningTime now_of_master() const { return relabel<FreeRunningTime>(now()); }
 
   std::function<bool(std::size_t)> lose;
-  std::function<void(LocalTime, ConstBytes)> capture;
+  std::function<void(FreeRunningTime, ConstBytes)> capture;
   std::function<void(const FrameView&)> tamper;  ///< changes what comes back
 
  private:

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/subdevice/segment.h"
+#include "ftcs/sim/drives/segment.h"
 
 namespace ftcs::ethercat::test {
 

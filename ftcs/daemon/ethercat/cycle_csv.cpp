@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ethercat/cycle_csv.h"
+
+#include <array>
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+namespace ftcs::daemon {
+
+std::optional<WriteError> CycleCsv::open(const std::string& path) {
+  path_ = path;
+  file_.reset(std::fopen(path.c_str(), "a"));
+  check(is_open());
+  return error_;
+}
+
+void CycleCsv::begin() {
+  if (!is_open()) return;
+  std::error_code problem;
+  if (std::filesystem::is_regular_file(path_, problem)) {
+    std::filesystem::resize_file(path_, 0, problem);
+    errno = problem.value();
+    check(!problem);
+  }
+  constexpr const char* kHeader =
+      "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,working_counter,"
+      "margin_ns,skipped\n";
+  if (is_open()) check(std::fputs(kHeader, file_.get()) >= 0 && std::fflush(file_.get()) == 0);
+}
+
+void CycleCsv::check(bool good) {
+  if (good) return;
+  error_ =
+      WriteError{fmt::format("cannot write {}: {}", path_, std::generic_category().message(errno))};
+  file_.reset();
+}
+
+void CycleCsv::write(std::uint64_t cycle, const CycleDecision& decision, const CycleSample& sample,
+                     std::uint16_t working_counter, std::int64_t margin_ns) {
+  if (!is_open()) return;
+  constexpr std::size_t kLongestLine = 400;
+  std::array<char, kLongestLine> line{};
+  const auto end = fmt::format_to_n(
+      line.data(), line.size(), "{},{},{},{:.1f},{:.1f},{:.1f},{:.3f},{},{},{}\n", cycle,
+      static_cast<int>(decision.state), static_cast<int>(decision.verdict),
+      decision.phase_error.ns(), decision.lateness.ns(), (sample.received - sample.sent).ns(),
+      decision.rate.ppb(), working_counter, margin_ns, decision.skipped);
+  const auto size = static_cast<std::size_t>(end.out - line.data());
+  check(std::fwrite(line.data(), 1, size, file_.get()) == size);
+}
+
+std::optional<WriteError> CycleCsv::finish() {
+  if (is_open()) check(std::fflush(file_.get()) == 0);
+  return error_;
+}
+
+}  // namespace ftcs::daemon

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ethercat/main_runner.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "ftcs/daemon/ethercat/run_report.h"
+
+namespace ftcs::daemon {
+
+namespace {
+
+using platform::HostClock;
+
+/// A frame of the bring-up that is not back by then is lost.
+constexpr Nanoseconds kReplyTimeout{5'000'000};
+/// A segment in software may have to wait for its processor: half a second until nobody answers.
+constexpr std::uint32_t kRetries = 100;
+/// The part of a cycle in which its frame must be back.
+constexpr double kReplyShare = 0.8;
+/// Live lines on the terminal.
+constexpr Nanoseconds kLineInterval{1'000'000'000};
+
+}  // namespace
+
+node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
+  node::CycleNodeConfig config;
+  const double cycle_s = static_cast<double>(options.servo.cycle.count()) * 1e-9;
+  const auto cycles = [cycle_s](double seconds) {
+    return static_cast<std::uint64_t>(seconds / cycle_s);
+  };
+  config.main.expected_subdevices = options.drives;
+  config.main.retries = kRetries;
+  config.main.lost_frame_limit = options.lost_frame_limit;
+  config.main.scan_only = scan_only;
+  config.main.clocks.drift_pulses = scan_only ? 0 : options.drift_pulses;
+  config.main.absence_limit = std::max(config.main.absence_limit,
+                                       static_cast<std::uint32_t>(cycles(options.ride_through_s)));
+  config.servo = options.servo;
+  config.sync0_phase = options.sync0_phase;
+  config.sync_error_limit = static_cast<std::uint16_t>(options.sync_error_limit);
+  config.supervision.lock_policy = options.lock_policy;
+  config.supervision.unlocked_limit = cycles(options.unlocked_limit_s);
+  config.supervision.await_limit = cycles(options.await_lock_s);
+  config.axes.move = options.move;
+  config.axes.radius = options.radius;
+  config.axes.turn_s = options.turn_s;
+  config.axes.fault_resets = options.fault_resets;
+  return config;
+}
+
+MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
+    : options_(options),
+      link_(std::move(link)),
+      node_(std::make_unique<node::CycleNode>(node_config(options, false))),
+      watch_({options.duration_s, options.trace, options.contour}) {}
+
+bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) {
+  stamps_.sent = stamps_.received = HostClock::now();
+  if (frame.empty()) return false;
+  const int error = link_.send(frame);
+  bool answered = false;
+  while (error == 0 && !answered) {
+    const auto back = link_.receive(deadline, false);
+    if (!back) break;
+    stamps_.received = back->stamp;
+    answered = node_->on_frame(back->frame, stamps_) != ethercat::FrameOutcome::kIgnored;
+  }
+  if (const auto stamp = link_.transmit_stamp()) stamps_.sent = *stamp;
+  return answered;
+}
+
+void MainRunner::exchange() {
+  const ethercat::ConstBytes frame = node_->next_frame();
+  if (!transfer(frame, HostClock::now() + Duration{kReplyTimeout})) node_->on_timeout();
+}
+
+bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
+  if (scan_only) node_ = std::make_unique<node::CycleNode>(node_config(options_, true));
+  auto stage = ethercat::Stage::kStopped;
+  while (!node_->cyclic() && !node_->stopped()) {
+    if (stop()) return false;
+    if (stage != main().stage() && !options_.quiet && !scan_only) {
+      stage = main().stage();
+      fmt::print("{} ...\n", ethercat::name(stage));
+      std::fflush(stdout);
+    }
+    exchange();
+  }
+  return !main().failure();
+}
+
+void MainRunner::run(const std::function<bool()>& stop) {
+  csv_.begin();
+  const FreeRunningTime start = HostClock::now();
+  watch_.reserve(*node_, start);
+  next_line_ = start + Duration{kLineInterval};
+  node_->start(HostClock::now());
+  try {
+    while (!stop() && node_->cyclic()) {
+      const double elapsed_s = (HostClock::now() - start).seconds();
+      if (options_.duration_s > 0.0 && elapsed_s > options_.duration_s) break;
+      cycle();
+    }
+  } catch (...) {  // live lines that cannot be printed
+    stop_drives();
+    throw;
+  }
+  stop_drives();
+}
+
+/// They shall not find out by their watchdogs.
+void MainRunner::stop_drives() {
+  node_->stop();
+  while (!node_->stopped()) exchange();
+}
+
+void MainRunner::cycle() {
+  HostClock::wait_until(decision().wake, options_.spin);
+  const auto limit =
+      static_cast<std::int64_t>(kReplyShare * static_cast<double>(options_.servo.cycle.count()));
+  const FreeRunningTime woken = HostClock::now();
+  const bool answered =
+      transfer(node_->begin_cycle(woken), HostClock::now() + Duration::from_whole_ns(limit));
+  node_->end_cycle(answered, stamps_, HostClock::now());
+  watch_.note(*node_, HostClock::now());
+  if (csv_.is_open()) {
+    csv_.write(figures().cycles, decision(), node_->sample(), main().last_cycle().working_counter,
+               node_->margin_ns());
+  }
+  if (HostClock::now() >= next_line_) {
+    next_line_ = next_line_ + Duration{kLineInterval};
+    link_.refresh_clock();
+    if (!options_.quiet) print_live();
+  }
+}
+
+void MainRunner::print_live() const {
+  const ethercat::CycleReport& report = main().last_cycle();
+  const double rate = decision().rate.ratio();
+  fmt::print(
+      "margin {:7.1f} us  {:9} (first after {})  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle "
+      "{:.6f} ms  "
+      "wkc {}/{}  al 0x{:02X}  |0x092C| < {} ns  lost {}  late {}\n",
+      figures().margin.quantile(0.5) * 1e-3, name(decision().state), figures().lock_cycle,
+      decision().phase_error.ns() * 1e-3, decision().rate.ppm(),
+      static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
+      report.expected, report.states, report.difference_bound_ns + 1, main().counters().lost,
+      servo_counters().late);
+  std::fflush(stdout);
+}
+
+}  // namespace ftcs::daemon

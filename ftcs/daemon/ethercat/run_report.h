@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/report/json.h"
+
+namespace ftcs::daemon {
+
+[[nodiscard]] const char* name(CycleState state);
+[[nodiscard]] const char* name(node::CycleNote::Kind kind);
+void print_scan(const ethercat::MainDevice& main);
+/// One or two lines for the user: what failed, where, and what was expected.
+[[nodiscard]] std::string describe(const ethercat::Failure& failure);
+void print_run(const MainRunner& runner);
+[[nodiscard]] Json run_json(const MainRunner& runner);
+
+}  // namespace ftcs::daemon

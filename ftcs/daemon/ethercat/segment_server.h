@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ftcs/platform/ethercat_link.h"
+#include "ftcs/sim/drives/segment.h"
+#include "ftcs/sim/oscillator.h"
+
+namespace ftcs::daemon {
+
+/// Something that happens to a running segment.
+struct SegmentFault {
+  enum class Kind : std::uint8_t { kCut, kMend, kRestart, kSkew };
+  Kind kind = Kind::kCut;
+  std::size_t device = 0;
+  double at_s = 0.0;  ///< after the first frame
+  double ppm = 0.0;   ///< kSkew: the crystal's deviation from then on
+};
+
+struct SegmentOptions {
+  std::string interface;  ///< raw Ethernet; empty: UDP
+  std::string address = "127.0.0.1";
+  std::uint16_t port = ethercat::kUdpPort;
+  std::size_t drives = 8;
+  std::vector<double> ppm{50.0, -80.0, 80.0};  ///< of the crystals; the last two take turns
+  double random_walk_ppb = 0.0;                ///< per square root of a second
+  bool tree = false;                           ///< every SubDevice carries up to three; else a line
+  Nanoseconds cable{50};
+  Nanoseconds hop{300};
+  /// Share of the frames that are swallowed, half of them before they reach a drive.
+  double drop = 0.0;
+  /// Bit 31 of 0x092C is documented both ways: set when the local copy is ahead, or behind.
+  bool sign_bit_means_ahead = true;
+  std::uint64_t seed = 1;
+  double duration_s = 0.0;  ///< zero: until a signal
+  std::vector<SegmentFault> faults;
+  std::string json;
+};
+
+/// A crystal of the simulator on the time of the wire.
+class SimulatedCrystal final : public ethercat::LocalOscillator {
+ public:
+  SimulatedCrystal(sim::OscillatorSpec spec, std::uint64_t seed, std::uint64_t index,
+                   ethercat::WireTime start)
+      : oscillator_(std::move(spec), seed, index), start_(start) {}
+  [[nodiscard]] Duration reading(ethercat::WireTime instant) noexcept override {
+    return oscillator_.reading_at(sim::TrueTime{instant - start_}).since_epoch() +
+           extra_.reading(instant);
+  }
+  /// An additional deviation from an instant on.
+  void skew(double ppm, ethercat::WireTime from) noexcept {
+    extra_.set_rate(Rate::from_ratio(ppm * 1e-6), from);
+  }
+
+ private:
+  sim::Oscillator oscillator_;
+  ethercat::WireTime start_;
+  ethercat::AffineOscillator extra_{Rate::from_ratio(0.0)};
+};
+
+/// Serves a segment of modelled drives on a link until it is told to stop.
+class SegmentServer {
+ public:
+  SegmentServer(const SegmentOptions& options, platform::EthercatLink link);
+  /// Returns when `stop` says so or the time is up.
+  template <class Stop>
+  void run(const Stop& stop) {
+    while (!stop() && !finished()) serve();
+  }
+  void serve();
+  void print_summary() const;
+  [[nodiscard]] std::string json() const;
+  [[nodiscard]] const ethercat::Segment& segment() const { return *segment_; }
+
+ private:
+  [[nodiscard]] bool finished() const;
+  void build();
+  void apply_faults(FreeRunningTime now);
+  void apply(const SegmentFault& fault, ethercat::WireTime now);
+
+  SegmentOptions options_;
+  platform::EthercatLink link_;
+  std::unique_ptr<ethercat::Segment> segment_;
+  std::vector<std::unique_ptr<SimulatedCrystal>> crystals_;
+  FreeRunningTime start_;
+  bool started_ = false;
+  std::size_t next_fault_ = 0;
+  std::uint64_t frames_ = 0;
+  std::uint64_t malformed_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::uint64_t user_stamps_ = 0;
+  std::uint64_t random_ = 0;
+};
+
+}  // namespace ftcs::daemon

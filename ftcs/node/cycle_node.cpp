@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/node/cycle_node.h"
+
+#include <algorithm>
+
+#include "ftcs/time/relabel.h"
+
+namespace ftcs::node {
+
+CycleNode::Objects CycleNode::objects_for(const CycleNodeConfig& config) noexcept {
+  Objects objects{};
+  const auto csp = ethercat::csp_objects(config.servo.cycle);
+  static_assert(csp.size() + 1 == kObjects);
+  std::copy(csp.begin(), csp.end(), objects.begin());
+  objects.back() = {{0x10F1, 2}, 2, config.sync_error_limit.value_or(0), false};
+  return objects;
+}
+
+ethercat::MainDeviceConfig CycleNode::main_config(const CycleNodeConfig& config,
+                                                  const Objects& objects) noexcept {
+  ethercat::MainDeviceConfig result = config.main;
+  const std::size_t used = config.sync_error_limit ? kObjects : kObjects - 1;
+  result.process.objects = std::span{objects}.first(used);
+  result.process.cycle = config.servo.cycle;
+  const auto phase = config.sync0_phase * static_cast<double>(config.servo.cycle.count());
+  result.process.sync0_shift = config.servo.shift + Nanoseconds{static_cast<std::int64_t>(phase)};
+  return result;
+}
+
+CycleNode::CycleNode(const CycleNodeConfig& config) noexcept
+    : config_(config),
+      objects_(objects_for(config)),
+      main_(main_config(config, objects_)),
+      servo_(config.servo),
+      axes_(config.axes),
+      supervision_(config.supervision, config.servo.law != CycleLaw::kNone) {}
+
+const CycleDecision& CycleNode::start(FreeRunningTime now) noexcept {
+  decision_ = servo_.start(now);
+  return decision_;
+}
+
+ethercat::ConstBytes CycleNode::begin_cycle(FreeRunningTime now) noexcept {
+  notes_.clear();
+  // All axes from one time: the reference's, as the steered clock knows it.
+  const double time_s = servo_.next_trigger().local.since_epoch().seconds();
+  axes_.cycle(main_, supervision_.op_cycle() >= 0, time_s, notes_);
+  if (decision_.state != CycleState::kWaiting) {
+    // The steered clock is what the other drives are given, should the reference be missing.
+    const LocalTime at_reference = servo_.local_at(now) + Duration{config_.servo.transit};
+    main_.set_reference_estimate(relabel<ReferenceTime>(at_reference));
+  }
+  return main_.next_frame();
+}
+
+const CycleDecision& CycleNode::end_cycle(bool answered, const ethercat::FrameStamps& stamps,
+                                          FreeRunningTime now) noexcept {
+  if (!answered) main_.on_timeout();
+  sample_ = {};
+  sample_.sent = stamps.sent;
+  sample_.received = stamps.received;
+  sample_.has_received = answered;
+  sample_.has_reference = answered && main_.last_cycle().has_reference;
+  sample_.reference = main_.last_cycle().reference;
+  decision_ = servo_.update(sample_, now);
+  supervision_.cycle(main_, decision_.state, notes_);
+  return decision_;
+}
+
+std::int64_t CycleNode::margin_ns() const noexcept {
+  const auto cycle = config_.servo.cycle.count();
+  const auto until_sync0 =
+      static_cast<std::int64_t>(main_.sync0_start()) - sample_.reference.since_epoch().rounded_ns();
+  return ((until_sync0 % cycle) + cycle) % cycle;
+}
+
+}  // namespace ftcs::node

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/ethercat/maindevice/csp_profile.h"
+#include "ftcs/ethercat/maindevice/main_device.h"
+#include "ftcs/node/cycle_notes.h"
+#include "ftcs/node/drive_axes.h"
+#include "ftcs/node/drive_supervision.h"
+
+namespace ftcs::node {
+
+struct CycleNodeConfig {
+  /// Its process.objects, cycle and sync0_shift are set by the node.
+  ethercat::MainDeviceConfig main;
+  CycleServoConfig servo;
+  double sync0_phase =
+      0.5;  ///< SYNC0 comes this part of a cycle after the frame's own place; 0 to 1
+  /// 0x10F1:02 of the drives: a missed SYNC0 window counts three, a good one takes one off, and the
+  /// drive faults above the limit; 0: never. No value: what the drive has of itself.
+  std::optional<std::uint16_t> sync_error_limit;
+  DriveSupervisionConfig supervision;
+  DriveAxesConfig axes;
+};
+
+/// One EtherCAT segment and the cycle that follows its distributed clock, without I/O: the
+/// MainDevice, the cycle servo, the axes and the rules between them. Frames, stamps and instants of
+/// the host in; frames, the next wake-up and notes out.
+///
+///   while (!node.cyclic() && !node.stopped())      bring-up: as fast as frames come back
+///     send(node.next_frame()); node.on_frame(...) or node.on_timeout();
+///   wake = node.start(now).wake;
+///   while (!node.stopped())                        one cycle
+///     wait(wake); send(node.begin_cycle(now)); node.on_frame(...);
+///     wake = node.end_cycle(stamps, now).wake;
+///
+/// After stop(), or when a rule stopped the drives, next_frame() sends them to SAFEOP until
+/// stopped() is true. Some 100 KB; nothing is allocated. Not to be copied: the configuration of the
+/// drives refers to the node's own memory.
+class CycleNode {
+ public:
+  explicit CycleNode(const CycleNodeConfig& config) noexcept;
+  CycleNode(const CycleNode&) = delete;
+  CycleNode& operator=(const CycleNode&) = delete;
+
+  [[nodiscard]] ethercat::ConstBytes next_frame() noexcept { return main_.next_frame(); }
+  /// What came back; kIgnored: not the answer that is waited for.
+  ethercat::FrameOutcome on_frame(ethercat::Bytes frame,
+                                  const ethercat::FrameStamps& stamps) noexcept {
+    return main_.on_frame(frame, stamps);
+  }
+  ethercat::FrameOutcome on_timeout() noexcept { return main_.on_timeout(); }
+
+  /// The cyclic part begins: the first trigger.
+  const CycleDecision& start(FreeRunningTime now) noexcept;
+  /// At a trigger: the axes move, the frame of the cycle is written.
+  [[nodiscard]] ethercat::ConstBytes begin_cycle(FreeRunningTime now) noexcept;
+  /// The frame of this cycle left at `sent` and came back (`answered`) at `received`, or did not;
+  /// it is `now`. What follows for servo and drives; notes() are of this cycle.
+  const CycleDecision& end_cycle(bool answered, const ethercat::FrameStamps& stamps,
+                                 FreeRunningTime now) noexcept;
+  /// All drives to SAFEOP; go on with next_frame() until stopped().
+  void stop() noexcept { main_.stop(); }
+
+  [[nodiscard]] bool cyclic() const noexcept { return main_.cyclic(); }
+  [[nodiscard]] bool stopped() const noexcept { return main_.stage() == ethercat::Stage::kStopped; }
+  [[nodiscard]] const ethercat::MainDevice& main() const noexcept { return main_; }
+  [[nodiscard]] const CycleServo& servo() const noexcept { return servo_; }
+  [[nodiscard]] const DriveAxes& axes() const noexcept { return axes_; }
+  [[nodiscard]] const DriveSupervision& supervision() const noexcept { return supervision_; }
+  [[nodiscard]] const CycleNodeConfig& config() const noexcept { return config_; }
+  [[nodiscard]] const CycleDecision& decision() const noexcept { return decision_; }
+  /// What the servo was told about the last cycle.
+  [[nodiscard]] const CycleSample& sample() const noexcept { return sample_; }
+  [[nodiscard]] std::span<const CycleNote> notes() const noexcept { return notes_.all(); }
+  /// From the last frame's arrival at the reference to the SYNC0 that follows, ns in [0, cycle).
+  [[nodiscard]] std::int64_t margin_ns() const noexcept;
+
+ private:
+  /// csp_objects() and 0x10F1:02.
+  static constexpr std::size_t kObjects = 22;
+  using Objects = std::array<ethercat::SdoDownload, kObjects>;
+  [[nodiscard]] static Objects objects_for(const CycleNodeConfig& config) noexcept;
+  [[nodiscard]] static ethercat::MainDeviceConfig main_config(const CycleNodeConfig& config,
+                                                              const Objects& objects) noexcept;
+
+  CycleNodeConfig config_;
+  Objects objects_;
+  ethercat::MainDevice main_;
+  CycleServo servo_;
+  DriveAxes axes_;
+  DriveSupervision supervision_;
+  CycleDecision decision_;
+  CycleSample sample_;
+  CycleNotes notes_;
+};
+
+}  // namespace ftcs::node
