@@ -75,6 +75,8 @@ void add_analyse_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--unit", options->series.unit,
       "s, ms, us, ns, ps; of frequency 1, ppm, ppb, ppt (default: by heading and kind)");
+  command->add_option("--source", options->series.source,
+                      "of a log of several programs or clocks: which, as in 'phc2sys eth1'");
   command
       ->add_option("--interval", options->interval_s,
                    "seconds between values (default: from the times, else 1)")

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/experiment_files.h"
@@ -21,6 +23,7 @@ struct CompareOptions {
   std::string file;
   std::string suite;
   std::string log;
+  std::string source;  ///< of a log with several programs or clocks
   SweepOptions sweep;
 };
 
@@ -36,21 +39,34 @@ std::vector<experiment::Scenario> parse_all(const std::vector<ExperimentFile>& f
   return scenarios;
 }
 
+/// A servo that a replay does not have: the bound needs to know the noise, which no record tells.
+bool knows_servos(const std::vector<std::string>& wanted) {
+  const auto known = experiment::replay_servo_names();
+  for (const std::string& name : wanted) {
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    fmt::print(stderr, "ftcs: --servo {}: a replay has {}\n", name, fmt::join(known, ", "));
+    return false;
+  }
+  return true;
+}
+
 int compare_log(const CompareOptions& options) {
   const SweepOptions& files = options.sweep;
-  if (!can_write_results({files.json, files.csv, files.html})) return kRuntimeError;
-  auto log = experiment::read_recorded_log(options.log);
+  if (!knows_servos(files.servos)) return kUsageError;
+  if (!can_write_results({files.json, files.csv, files.html, files.trace})) return kRuntimeError;
+  auto log = experiment::read_recorded_log(options.log, options.source);
   if (!log) {
     fmt::print(stderr, "ftcs: {}\n", log.error().text());
     return kRuntimeError;
   }
   LogComparison comparison{options.log, std::move(*log), {}};
-  comparison.servos = experiment::replay_log(comparison.log);
+  comparison.servos = experiment::replay_log(comparison.log, files.servos);
   if (!options.sweep.quiet) fmt::print("{}", log_console(comparison));
   bool written =
       files.json.empty() || write_result(files.json, dump(log_json(comparison, FTCS_VERSION)));
   written &= files.csv.empty() || write_result(files.csv, log_table(comparison).to_csv());
   written &= files.html.empty() || write_result(files.html, log_html(comparison, FTCS_VERSION));
+  written &= files.trace.empty() || write_result(files.trace, log_trace_csv(comparison));
   return written ? kSuccess : kRuntimeError;
 }
 
@@ -103,17 +119,24 @@ void add_compare_command(CLI::App& app, int& exit_code) {
       "compare", "All servos on the same packets, ranked against the Kalman bound");
   auto* file = command->add_option("FILE", options->file,
                                    "scenario (TOML); default: gaussian 100 ns at 1 s");
+  auto* suite = command->add_option("--suite", options->suite,
+                                    "all scenario files of a folder, or a built-in suite: peers");
+  suite->excludes(file);
+  auto* log = command->add_option(
+      "--log", options->log,
+      "replay a log instead: ptp4l, phc2sys, chrony tracking or measurements, CSV of "
+      "t1..t4 or of offsets; also gzip; - = standard input");
+  log->excludes(file)->excludes(suite);
   command
-      ->add_option("--suite", options->suite,
-                   "all scenario files of a folder, or a built-in suite: peers")
-      ->excludes(file);
-  command
-      ->add_option("--log", options->log,
-                   "replay a log instead: ptp4l, phc2sys, chrony tracking or measurements, CSV of "
-                   "t1..t4 or of "
-                   "offsets; also gzip; - = standard input")
-      ->excludes(file);
+      ->add_option("--source", options->source,
+                   "of a log of several programs or clocks: which, as in 'phc2sys CLOCK_REALTIME'")
+      ->needs(log);
   add_sweep_options(*command, options->sweep);
+  // A record is one run of one world: there is nothing to draw, to share or to join.
+  for (const char* name :
+       {"--seeds", "--first-seed", "--medians-only", "--threads", "--shard", "--merge"}) {
+    log->excludes(command->get_option(name));
+  }
   command->callback([options, &exit_code] { exit_code = guarded(compare, *options); });
 }
 

@@ -69,8 +69,10 @@ class ChronyLog final : public LogFormat {
     return "";
   }
 
-  void finish(RecordedLog& log) override {
-    if (lines_.empty()) return;
+  [[nodiscard]] std::string finish(RecordedLog& log, const std::string& source) override {
+    if (auto complaint = no_such_source(source, name()); !complaint.empty()) return complaint;
+    if (lines_.empty()) return "";
+    log.steered = tracking_;
     log.notes.emplace_back(
         "chrony writes whole seconds: a frequency of f ppm is wrong by up to f us an interval");
     log.notes.emplace_back(
@@ -89,8 +91,10 @@ class ChronyLog final : public LogFormat {
         x_ns = lines_[i].offset_ns;
       }
       const Duration reference = Duration::from_whole_ns(lines_[i].time_s * 1'000'000'000) - start;
-      log.pairs.push_back(offset_pair(reference, Duration::from_ns(x_ns)));
+      log.pairs.push_back(
+          offset_pair(reference, Duration::from_ns(x_ns), lines_[i].offset_ns - x_ns));
     }
+    return "";
   }
 
  private:

@@ -14,9 +14,15 @@ std::unique_ptr<LogFormat> detect_format(std::string_view line) {
   return detect_csv(line);
 }
 
-RecordedPair offset_pair(Duration reference, Duration offset, std::optional<double> truth_ns) {
+RecordedPair offset_pair(Duration reference, Duration offset, double steering_ns) {
   return {{Direction::kForward, ReferenceTime{reference}, FreeRunningTime{reference + offset}},
-          truth_ns};
+          std::nullopt,
+          steering_ns};
+}
+
+std::string no_such_source(const std::string& source, const std::string& format) {
+  if (source.empty()) return "";
+  return "no source '" + source + "': a file of " + format + " is about one clock";
 }
 
 std::optional<Duration> parse_time(std::string_view text, std::int64_t unit_ns) {

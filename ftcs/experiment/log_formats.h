@@ -18,7 +18,9 @@ class LogFormat {
   [[nodiscard]] virtual bool is_heading(std::string_view line) const = 0;
   /// Empty, or why the line cannot be used.
   [[nodiscard]] virtual std::string take(std::string_view line) = 0;
-  virtual void finish(RecordedLog& log) = 0;
+  /// Makes the pairs. `source`: which of several programs or clocks, empty = the largest. Empty, or
+  /// why that cannot be.
+  [[nodiscard]] virtual std::string finish(RecordedLog& log, const std::string& source) = 0;
 
  protected:
   LogFormat() = default;
@@ -35,7 +37,10 @@ class LogFormat {
 
 /// A pair of a clock whose offset is known: free running = reference + offset.
 [[nodiscard]] RecordedPair offset_pair(Duration reference, Duration offset,
-                                       std::optional<double> truth_ns = {});
+                                       double steering_ns = 0.0);
+
+/// For formats that have one clock only: why `source` cannot be chosen, or empty.
+[[nodiscard]] std::string no_such_source(const std::string& source, const std::string& format);
 
 /// Exact reading of a decimal number of `unit_ns` nanoseconds: whole units as integers, so that
 /// seconds since 1970 keep their nanoseconds. Nothing if it is no number or beyond 146 years.

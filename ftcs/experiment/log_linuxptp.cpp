@@ -16,46 +16,56 @@ namespace {
 /// log's times are those of printing, to a millisecond, and 50 ppm of a millisecond are 50 ns.
 constexpr double kSnap = 0.25;
 
-std::string program_of(std::string_view line) {
-  for (const char* program : {"ptp4l", "phc2sys", "ts2phc"}) {
-    if (line.find(program) != std::string_view::npos) return program;
-  }
-  return "";
-}
-
 class LinuxptpLog final : public LogFormat {
  public:
-  explicit LinuxptpLog(std::string program) : program_(std::move(program)) {}
-
-  [[nodiscard]] std::string name() const override { return program_; }
+  [[nodiscard]] std::string name() const override { return chosen_.substr(0, chosen_.find(' ')); }
   [[nodiscard]] bool is_heading(std::string_view) const override { return false; }
 
   [[nodiscard]] std::string take(std::string_view line) override {
-    const auto parsed = parse_offset_log_line(line);
-    if (!parsed) return "no offset in it";
-    if (program_of(line) != program_ && !program_of(line).empty())
-      return "of another program than " + program_;
-    if (!parsed->frequency_ppb) return "an offset without a frequency";
-    if (parsed->time_s && !lines_.empty() && lines_.back().time_s &&
-        *parsed->time_s < *lines_.back().time_s) {
-      return "its time goes backward";
+    if (const auto parsed = parse_offset_log_line(line); parsed && !parsed->frequency_ppb)
+      return "an offset without a frequency";
+    return log_.add(line);
+  }
+
+  [[nodiscard]] std::string finish(RecordedLog& log, const std::string& source) override {
+    const OffsetLog::Source* picked = log_.pick(source);
+    if (picked == nullptr)
+      return fmt::format("no offsets of '{}': the log has {}", source, log_.describe_sources());
+    log.source = chosen_ = picked->name;
+    if (log_.sources().size() > 1) {
+      log.notes.push_back(fmt::format("the log has {}: {} is replayed; --source chooses",
+                                      log_.describe_sources(), chosen_));
     }
-    lines_.push_back(*parsed);
+    keep_ascending(*picked, log);
+    rebuild(log);
     return "";
   }
 
-  void finish(RecordedLog& log) override {
-    if (lines_.empty()) return;
+ private:
+  void keep_ascending(const OffsetLog::Source& source, RecordedLog& log) {
+    for (const OffsetLogLine& line : source.lines) {
+      const bool backward = line.time_s && !lines_.empty() && lines_.back().time_s &&
+                            *line.time_s < *lines_.back().time_s;
+      if (!backward) lines_.push_back(line);
+    }
+    log.used = lines_.size();
+    const std::size_t dropped = source.lines.size() - lines_.size();
+    log.unusable += dropped;
+    if (dropped > 0)
+      log.notes.push_back(fmt::format("{} lines whose time goes backward are left out", dropped));
+  }
+
+  void rebuild(RecordedLog& log) {
     const bool free_running = std::all_of(lines_.begin(), lines_.end(),
                                           [](const OffsetLogLine& l) { return l.state == 0; });
     const std::vector<double> steps_s = intervals(log);
+    log.steered = !free_running;
     log.notes.push_back(
         free_running
             ? "s0 throughout: the clock was free-running already; the frequency column is a "
               "measurement and is not added"
             : "the free-running clock is rebuilt from offset and applied frequency; a step (s1) "
-              "takes "
-              "the offset away");
+              "takes the offset away");
     log.notes.push_back(
         "offsets are those that the program computed: its path-delay filter is in them");
     Duration reference{};
@@ -64,11 +74,11 @@ class LinuxptpLog final : public LogFormat {
     for (std::size_t i = 1; i < lines_.size(); ++i) {
       reference += Duration::from_ns(steps_s[i - 1] * 1e9);
       x_ns = free_running ? lines_[i].offset_ns : x_ns + change_ns(i, steps_s[i - 1]);
-      log.pairs.push_back(offset_pair(reference, Duration::from_ns(x_ns)));
+      log.pairs.push_back(
+          offset_pair(reference, Duration::from_ns(x_ns), lines_[i].offset_ns - x_ns));
     }
   }
 
- private:
   /// How much the free-running clock gained between lines i - 1 and i. The printed frequency is how
   /// fast the program takes the oscillator to be; it runs the clock slower by as much.
   [[nodiscard]] double change_ns(std::size_t i, double dt_s) const {
@@ -103,19 +113,17 @@ class LinuxptpLog final : public LogFormat {
     return steps;
   }
 
-  std::string program_;
-  std::vector<OffsetLogLine> lines_;
+  OffsetLog log_;
+  std::string chosen_ = "linuxptp";
+  std::vector<OffsetLogLine> lines_;  ///< of the chosen source
 };
 
 }  // namespace
 
 std::unique_ptr<LogFormat> detect_linuxptp(std::string_view line) {
-  if (!is_linuxptp_line(line) && !parse_offset_log_line(line)) return nullptr;
-  // Start-up messages come before the first offset; the program is told by the first line that has
-  // one.
-  if (!parse_offset_log_line(line)) return nullptr;
-  const std::string program = program_of(line);
-  return std::make_unique<LinuxptpLog>(program.empty() ? "ptp4l" : program);
+  // Start-up messages come before the first offset; a log of summaries alone shall be told as that.
+  if (!parse_offset_log_line(line) && !is_summary_line(line)) return nullptr;
+  return std::make_unique<LinuxptpLog>();
 }
 
 }  // namespace ftcs::experiment

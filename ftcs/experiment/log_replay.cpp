@@ -2,8 +2,10 @@
 #include "ftcs/experiment/log_replay.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/clock/virtual_clock.h"
@@ -15,74 +17,146 @@ namespace {
 /// A replay cannot harm a clock; a limit that binds would compare limits instead of servos.
 constexpr double kRateLimitPpb = 1e8;
 
+/// What is known of a steered clock at one message, before it acts on it.
+struct ClockState {
+  LocalTime local;
+  double sigma_ns = kNoFigure;
+};
+
+/// Figures of one clock over a record: the same for a servo and for the clock as recorded.
+class ReplayJudge {
+ public:
+  ReplayJudge(const RecordedLog& log, std::string name) : log_(log) {
+    result_.servo = std::move(name);
+  }
+
+  /// True error (local minus reference) at this message, ns; not a number if the record does not
+  /// tell.
+  [[nodiscard]] static double true_error_ns(const RecordedPair& entry, LocalTime local) {
+    if (!entry.truth_ns) return kNoFigure;
+    // Local minus reference = local minus free running, plus free running minus reference.
+    return (local.since_epoch() - entry.pair.free_running.since_epoch()).ns() + *entry.truth_ns;
+  }
+
+  void measure(std::size_t index, const ClockState& clock) {
+    const RecordedPair& entry = log_.pairs[index];
+    const double offset_ns = offset_from_reference(clock.local, entry.pair.reference).ns();
+    const double error_ns = true_error_ns(entry, clock.local);
+    if (is_counted(index) && std::isfinite(error_ns)) errors_.push_back(error_ns);
+    if (!log_.two_way) return record(index, clock, offset_ns, error_ns);
+    if (entry.pair.direction == Direction::kForward) {
+      forward_ns_ = offset_ns;
+    } else if (forward_ns_) {
+      // Half of (t2 - t1) - (t4 - t3): the same for every servo, whatever delay it believes in.
+      record(index, clock, 0.5 * (*forward_ns_ + offset_ns), error_ns);
+      forward_ns_.reset();
+    }
+  }
+
+  void judge_deviation(std::size_t index, double estimate_ns, double error_ns, double sigma_ns) {
+    if (!is_counted(index) || !std::isfinite(error_ns) || !(sigma_ns > 0.0)) return;
+    const double miss = std::abs(estimate_ns - error_ns);
+    for (std::size_t i = 0; i < inside_.size(); ++i) {
+      if (miss <= static_cast<double>(i + 1) * sigma_ns) ++inside_[i];
+    }
+    ++judged_;
+  }
+
+  void add_rate(std::size_t index, Rate rate) {
+    if (is_counted(index)) rates_.add(rate.ppb());
+  }
+
+  [[nodiscard]] ReplayResult result() {
+    const Summary offsets = summarize(offsets_);
+    const Summary errors = summarize(errors_);
+    result_.samples = offsets.moments.count();
+    result_.rms_offset_ns = offsets.moments.rms();
+    result_.max_offset_ns = offsets.moments.max_absolute();
+    result_.rms_time_error_ns = errors.moments.rms();
+    result_.max_time_error_ns = errors.moments.max_absolute();
+    std::vector<double> sizes = log_.has_truth ? errors_ : offsets_;
+    for (double& size : sizes) size = std::abs(size);
+    std::sort(sizes.begin(), sizes.end());
+    result_.median_ns = quantile_of_sorted(sizes, 0.5);
+    result_.percentile_95_ns = quantile_of_sorted(sizes, 0.95);
+    for (std::size_t i = 0; i < inside_.size(); ++i)
+      result_.within_sigma[i] = judged_ > 0.0 ? inside_[i] / judged_ : kNoFigure;
+    result_.rate_spread_ppb = rates_.standard_deviation();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] bool is_counted(std::size_t index) const { return index >= log_.pairs.size() / 2; }
+
+  void record(std::size_t index, const ClockState& clock, double offset_ns, double error_ns) {
+    const Duration time = log_.pairs[index].pair.reference - log_.pairs.front().pair.reference;
+    result_.time_s.push_back(time.seconds());
+    result_.offset_ns.push_back(offset_ns);
+    result_.time_error_ns.push_back(error_ns);
+    result_.sigma_ns.push_back(clock.sigma_ns);
+    if (is_counted(index)) offsets_.push_back(offset_ns);
+  }
+
+  const RecordedLog& log_;
+  std::optional<double> forward_ns_;
+  std::vector<double> offsets_;
+  std::vector<double> errors_;
+  std::array<double, 3> inside_{};
+  double judged_ = 0.0;
+  RunningStatistics rates_;
+  ReplayResult result_;
+};
+
 class Replay {
  public:
   Replay(const RecordedLog& log, std::string name, const DisciplineConfig& config)
       : log_(log),
         clock_(source_, {first(), LocalTime{first().since_epoch()}, Rate{},
                          RateLimits::symmetric_ppb(kRateLimitPpb)}),
-        discipline_(config, clock_) {
-    result_.servo = std::move(name);
-  }
+        discipline_(config, clock_),
+        judge_(log, std::move(name)) {}
 
   ReplayResult run() {
+    double sigma_ns = kNoFigure;
     for (std::size_t i = 0; i < log_.pairs.size(); ++i) {
       const RecordedPair& entry = log_.pairs[i];
       source_.set(entry.pair.free_running);
-      measure(entry, i >= log_.pairs.size() / 2);
+      const LocalTime local = clock_.local_at(entry.pair.free_running);
+      judge_.measure(i, {local, sigma_ns});
       const Telemetry telemetry = discipline_.on_pair(entry.pair);
-      if (telemetry.commanded && i >= log_.pairs.size() / 2)
-        rates_.add(telemetry.tracking_rate.ppb());
+      sigma_ns = telemetry.servo.offset_sigma_ns;
+      judge_.judge_deviation(i, telemetry.servo.offset.ns(),
+                             ReplayJudge::true_error_ns(entry, local), sigma_ns);
+      if (telemetry.commanded) judge_.add_rate(i, telemetry.tracking_rate);
     }
-    result_.samples = offsets_.count();
-    result_.rms_offset_ns = offsets_.rms();
-    result_.max_offset_ns = offsets_.max_absolute();
-    result_.rms_time_error_ns = errors_.rms();
-    result_.max_time_error_ns = errors_.max_absolute();
-    result_.rate_spread_ppb = rates_.standard_deviation();
-    result_.commands = discipline_.counters().commands;
-    result_.steps = discipline_.counters().steps;
-    result_.rejected = discipline_.counters().rejected;
-    return std::move(result_);
+    ReplayResult result = judge_.result();
+    result.commands = discipline_.counters().commands;
+    result.steps = discipline_.counters().steps;
+    result.rejected = discipline_.counters().rejected;
+    return result;
   }
 
  private:
   [[nodiscard]] FreeRunningTime first() const { return log_.pairs.front().pair.free_running; }
 
-  void measure(const RecordedPair& entry, bool counted) {
-    const LocalTime local = clock_.local_at(entry.pair.free_running);
-    if (entry.truth_ns && counted) {
-      // Local minus reference = local minus free running, plus free running minus reference.
-      const Duration steered = local.since_epoch() - entry.pair.free_running.since_epoch();
-      errors_.add(steered.ns() + *entry.truth_ns);
-    }
-    const double offset_ns = offset_from_reference(local, entry.pair.reference).ns();
-    if (!log_.two_way) return record(entry, offset_ns, counted);
-    if (entry.pair.direction == Direction::kForward) {
-      forward_ns_ = offset_ns;
-    } else if (forward_ns_) {
-      // Half of (t2 - t1) - (t4 - t3): the same for every servo, whatever delay it believes in.
-      record(entry, 0.5 * (*forward_ns_ + offset_ns), counted);
-      forward_ns_.reset();
-    }
-  }
-
-  void record(const RecordedPair& entry, double offset_ns, bool counted) {
-    result_.time_s.push_back((entry.pair.reference - log_.pairs.front().pair.reference).seconds());
-    result_.offset_ns.push_back(offset_ns);
-    if (counted) offsets_.add(offset_ns);
-  }
-
   const RecordedLog& log_;
   sim::SettableSource source_;
   VirtualClock clock_;
   ClockDiscipline discipline_;
-  std::optional<double> forward_ns_;
-  RunningStatistics offsets_;
-  RunningStatistics errors_;
-  RunningStatistics rates_;
-  ReplayResult result_;
+  ReplayJudge judge_;
 };
+
+/// The recorded clock itself: nothing is known of its servo's commands.
+ReplayResult as_recorded(const RecordedLog& log) {
+  ReplayJudge judge(log, kAsRecorded);
+  for (std::size_t i = 0; i < log.pairs.size(); ++i) {
+    const RecordedPair& entry = log.pairs[i];
+    const Duration local =
+        entry.pair.free_running.since_epoch() + Duration::from_ns(entry.steering_ns);
+    judge.measure(i, {LocalTime{local}, kNoFigure});
+  }
+  return judge.result();
+}
 
 DisciplineConfig config_for(ServoKind kind, const RecordedLog& log) {
   DisciplineConfig config;
@@ -97,11 +171,22 @@ DisciplineConfig config_for(ServoKind kind, const RecordedLog& log) {
 
 }  // namespace
 
-std::vector<ReplayResult> replay_log(const RecordedLog& log) {
+std::vector<std::string> replay_servo_names() {
+  std::vector<std::string> names;
+  for (const ServoKindName& entry : kServoKinds) names.emplace_back(entry.name);
+  return names;
+}
+
+std::vector<ReplayResult> replay_log(const RecordedLog& log,
+                                     const std::vector<std::string>& servos) {
   std::vector<ReplayResult> results;
   for (const ServoKindName& entry : kServoKinds) {
-    results.push_back(Replay(log, std::string(entry.name), config_for(entry.kind, log)).run());
+    const bool wanted =
+        servos.empty() || std::find(servos.begin(), servos.end(), entry.name) != servos.end();
+    if (wanted)
+      results.push_back(Replay(log, std::string(entry.name), config_for(entry.kind, log)).run());
   }
+  if (log.steered) results.push_back(as_recorded(log));
   std::stable_sort(results.begin(), results.end(),
                    [&](const ReplayResult& a, const ReplayResult& b) {
                      return log.has_truth ? a.rms_time_error_ns < b.rms_time_error_ns

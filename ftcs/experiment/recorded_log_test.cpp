@@ -138,6 +138,107 @@ TEST_F(RecordedLogTest, empty_binary_and_foreign_files_are_one_clear_error) {
   EXPECT_FALSE(read_recorded_log("no/such/file").ok());
 }
 
+// An oscillator 20 ppm fast; Delay_Req 250 ms after Sync. Truth is told at the Sync: at the request
+// the clock is 5 us further, and an unsteered clock's error there is that, exactly.
+TEST_F(RecordedLogTest, truth_is_interpolated_to_the_instants_of_delay_requests) {
+  std::string text = "t1_ns,t2_ns,t3_ns,t4_ns,truth_ns\n";
+  for (std::int64_t i = 0; i < 8; ++i) {
+    const std::int64_t sync = 1'000'000'000 * i;
+    const std::int64_t request = sync + 250'000'000;
+    text += fmt::format("{},{},{},{},{}\n", sync, sync + 20'000 * i + 1000,
+                        request + 20'000 * i + 5'000, request + 1000, 20'000 * i);
+  }
+  const RecordedLog log = read(text);
+  ASSERT_EQ(log.pairs.size(), 16U);
+  EXPECT_EQ(log.pairs[1].pair.direction, Direction::kBackward);
+  EXPECT_NEAR(log.pairs[1].truth_ns.value_or(0.0), 5'000.0, 0.2);
+  EXPECT_FALSE(log.pairs[15].truth_ns) << "no truth is told after it";
+}
+
+/// A clock whose oscillator is 20 ppm fast, steered by alternating +-`ppm` from each line on.
+std::string steered_exchanges(const std::string& heading, double ppm, bool as_addend) {
+  std::string text = heading + "\n";
+  double local_ns = 0.0;
+  for (int i = 0; i < 20; ++i) {
+    const double sync_ns = 1e9 * i;
+    const double frequency = (i % 2 == 0 ? ppm : -ppm) * 1e-6;
+    text += fmt::format("{:.3f},{:.3f},,,{:.6f},{:.3f}", sync_ns, local_ns + 1000.0,
+                        as_addend ? 3'000'000'000.0 * (1.0 + frequency) : frequency * 1e9,
+                        local_ns - sync_ns);
+    text += as_addend ? ",3000000000\n" : "\n";
+    local_ns += 1e9 * (1.0 + 20e-6) * (1.0 + frequency);
+  }
+  return text;
+}
+
+TEST_F(RecordedLogTest, a_steered_clock_with_its_frequency_gives_back_the_free_running_clock) {
+  for (const bool as_addend : {false, true}) {
+    const RecordedLog log = read(steered_exchanges(
+        as_addend ? "t1,t2,t3,t4,addend,truth,nominal_addend" : "t1,t2,t3,t4,freq_ppb,truth", 50.0,
+        as_addend));
+    ASSERT_EQ(log.pairs.size(), 20U);
+    EXPECT_TRUE(log.steered);
+    for (std::size_t i = 0; i < log.pairs.size(); ++i) {
+      EXPECT_NEAR(x_ns(log, i), 20'000.0 * static_cast<double>(i) + 1000.0, 0.02) << i;
+      EXPECT_NEAR(log.pairs[i].truth_ns.value_or(0.0), 20'000.0 * static_cast<double>(i), 0.02);
+    }
+  }
+}
+
+TEST_F(RecordedLogTest, a_frequency_that_is_none_is_an_unusable_line) {
+  const RecordedLog log = read("time,offset,freq\n0,0,0\n1,0,0\n2,0,x\n3,0,600000000\n4,0,0\n");
+  EXPECT_EQ(log.pairs.size(), 3U);
+  EXPECT_EQ(log.unusable, 2U);
+}
+
+TEST_F(RecordedLogTest, units_may_stand_in_the_heading_in_any_customary_form) {
+  const RecordedLog log = read("Time [s];Offset (us)\n0;1\n1;2\n2;3\n");
+  EXPECT_EQ(x_ns(log, 2), 3000.0);
+}
+
+constexpr const char* kJournal =
+    "ptp4l[10.0]: master offset 10 s2 freq +0 path delay 1000\n"
+    "phc2sys[10.1]: CLOCK_REALTIME phc offset 700 s2 freq +0 delay 5\n"
+    "ptp4l[11.0]: master offset 20 s2 freq +0 path delay 1000\n"
+    "phc2sys[11.1]: CLOCK_REALTIME phc offset 800 s2 freq +0 delay 5\n"
+    "ptp4l[12.0]: master offset 30 s2 freq +0 path delay 1000\n"
+    "phc2sys[12.1]: CLOCK_REALTIME phc offset 900 s2 freq +0 delay 5\n"
+    "phc2sys[13.1]: CLOCK_REALTIME phc offset 950 s2 freq +0 delay 5\n";
+
+TEST_F(RecordedLogTest, one_clock_of_a_mixed_journal_is_replayed_and_the_others_are_named) {
+  const RecordedLog largest = read(kJournal);
+  EXPECT_EQ(largest.format, "phc2sys");
+  EXPECT_EQ(largest.source, "phc2sys CLOCK_REALTIME");
+  EXPECT_EQ(largest.used, 4U);
+  EXPECT_NE(largest.notes.front().find("ptp4l (3 lines)"), std::string::npos);
+  const auto chosen = read_recorded_log(path_.string(), "ptp4l");
+  ASSERT_TRUE(chosen.ok());
+  EXPECT_EQ(x_ns(*chosen, 2), 30.0);
+  const auto wrong = read_recorded_log(path_.string(), "ts2phc");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.error().text().find("no offsets of 'ts2phc'"), std::string::npos);
+}
+
+TEST_F(RecordedLogTest, a_log_of_summaries_alone_says_why_it_cannot_be_replayed) {
+  std::ofstream(path_) << "ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1\n";
+  const auto log = read_recorded_log(path_.string());
+  ASSERT_FALSE(log.ok());
+  EXPECT_NE(log.error().text().find("summary"), std::string::npos);
+}
+
+// What ptp4l itself did stands beside the servos: here an offset of 300 ns for ever.
+TEST_F(RecordedLogTest, the_clock_as_recorded_is_a_row_of_its_own) {
+  std::string text;
+  for (int i = 0; i < 40; ++i)
+    text += fmt::format("ptp4l[{}.0]: master offset 300 s2 freq +20000 path delay 1000\n", 10 + i);
+  const auto results = replay_log(read(text), {"ftcs"});
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_EQ(results.back().servo, kAsRecorded);
+  EXPECT_NEAR(results.back().rms_offset_ns, 300.0, 1e-3);
+  EXPECT_NEAR(results.back().median_ns, 300.0, 1e-3);
+  EXPECT_LT(results.front().rms_offset_ns, 1.0);
+}
+
 // An oscillator 20 ppm fast with 100 ns of alternating error: every servo but none follows; the
 // truth is the ramp.
 TEST_F(RecordedLogTest, a_replay_tells_what_the_clock_would_have_done) {
@@ -150,6 +251,10 @@ TEST_F(RecordedLogTest, a_replay_tells_what_the_clock_would_have_done) {
   for (const auto& result : results) {
     if (result.servo == "none") continue;
     EXPECT_LT(result.rms_time_error_ns, 500.0) << result.servo;
+    EXPECT_LE(result.median_ns, result.percentile_95_ns) << result.servo;
+    if (result.servo != "adaptive") continue;
+    EXPECT_GT(result.within_sigma[2], 0.95);
+    EXPECT_LE(result.within_sigma[0], result.within_sigma[1]);
   }
 }
 

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/record/offset_log.h"
 
+#include <algorithm>
+#include <array>
+
 #include "ftcs/record/fields.h"
 
 namespace ftcs {
 namespace {
+
+constexpr std::array<std::string_view, 3> kPrograms = {"ptp4l", "phc2sys", "ts2phc"};
 
 /// The number in the first pair of brackets that holds one: "ptp4l[12.345]", "ptp4l: [12.345]"; in
 /// "ptp4l[991]: [12.345.678]" as syslog writes it, the pair that holds a point.
@@ -27,6 +32,28 @@ std::optional<int> servo_state(std::string_view word) {
   return word[1] - '0';
 }
 
+std::string_view program_of(std::string_view line) {
+  for (const std::string_view program : kPrograms) {
+    if (line.find(program) != std::string_view::npos) return program;
+  }
+  return "ptp4l";  // the form is ptp4l's where nobody signs
+}
+
+/// The words between the time in brackets and "offset", less those that every line has: a clock's
+/// name ("CLOCK_REALTIME phc offset", "eth0 master offset") or a message tag ("[eth1] master").
+std::string clock_of(const std::vector<std::string_view>& words, std::size_t offset_at) {
+  std::string clock;
+  for (std::size_t i = offset_at; i-- > 0;) {
+    const std::string_view word = words[i];
+    if (word == "master" || word == "phc" || word == "sys" || word == "time") continue;
+    const bool ends_the_prefix =
+        word.ends_with(':') || (word.starts_with('[') && bracketed_time(word).has_value());
+    if (ends_the_prefix || clock.size() > 40) break;
+    clock.insert(0, " " + std::string(word));
+  }
+  return clock;
+}
+
 }  // namespace
 
 std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line) {
@@ -37,6 +64,7 @@ std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line) {
     const auto state = servo_state(words[i + 2]);
     if (!offset || !state) continue;
     OffsetLogLine parsed;
+    parsed.source = std::string(program_of(line)) + clock_of(words, i);
     parsed.time_s = bracketed_time(line);
     parsed.offset_ns = *offset;
     parsed.state = *state;
@@ -49,8 +77,53 @@ std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line) {
   return std::nullopt;
 }
 
+std::string OffsetLog::add(std::string_view line) {
+  auto parsed = parse_offset_log_line(line);
+  if (!parsed) {
+    return is_summary_line(line) ? "a summary (rms, max): the single offsets are not in it"
+                                 : "no offset in it";
+  }
+  auto source = std::find_if(sources_.begin(), sources_.end(),
+                             [&](const Source& known) { return known.name == parsed->source; });
+  if (source == sources_.end()) {
+    sources_.push_back({parsed->source, {}});
+    source = std::prev(sources_.end());
+  }
+  source->lines.push_back(std::move(*parsed));
+  return "";
+}
+
+const OffsetLog::Source* OffsetLog::pick(std::string_view name) const noexcept {
+  const Source* best = nullptr;
+  for (const Source& source : sources_) {
+    if (!name.empty() && source.name != name) continue;
+    if (best == nullptr || source.lines.size() > best->lines.size()) best = &source;
+  }
+  return best;
+}
+
+std::string OffsetLog::describe_sources() const {
+  std::string text;
+  for (const Source& source : sources_) {
+    text += (text.empty() ? "" : ", ") + source.name + " (" + std::to_string(source.lines.size()) +
+            " lines)";
+  }
+  return text;
+}
+
+bool is_summary_line(std::string_view line) {
+  const auto words = split_fields(line, ' ');
+  for (std::size_t i = 0; i + 3 < words.size(); ++i) {
+    if (words[i] == "rms" && words[i + 2] == "max" && parse_decimal(words[i + 1]) &&
+        parse_decimal(words[i + 3])) {
+      return true;
+    }
+  }
+  return false;
+}
+
 bool is_linuxptp_line(std::string_view line) {
-  for (const std::string_view program : {"ptp4l", "phc2sys", "ts2phc"}) {
+  for (const std::string_view program : kPrograms) {
     const std::size_t at = line.find(program);
     if (at == std::string_view::npos) continue;
     const std::string_view rest = line.substr(at + program.size());

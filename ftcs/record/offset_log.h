@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace ftcs {
 
@@ -11,6 +14,9 @@ namespace ftcs {
 ///   ptp4l[5197.201]: master offset        -12 s2 freq   +1234 path delay       567
 ///   phc2sys[5197.9]: CLOCK_REALTIME phc offset  31 s2 freq  +5 delay   468
 struct OffsetLogLine {
+  /// Who wrote it, and of which clock: "ptp4l", "phc2sys CLOCK_REALTIME", "ts2phc eth0", "ptp4l
+  /// [tag]".
+  std::string source;
   std::optional<double> time_s;  ///< CLOCK_MONOTONIC, in brackets; syslog may have dropped it
   double offset_ns = 0.0;        ///< local minus reference
   int state = 0;                 ///< 0 unlocked, 1 jump, 2 locked, 3 locked and stable
@@ -20,6 +26,33 @@ struct OffsetLogLine {
 
 /// Nothing if the line does not report an offset.
 [[nodiscard]] std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line);
+
+/// The lines of a log, told apart by the program that wrote them and the clock they are about. A
+/// journal holds those of several: their offsets are of different clocks and never one series.
+class OffsetLog {
+ public:
+  struct Source {
+    std::string name;
+    std::vector<OffsetLogLine> lines;
+  };
+
+  /// Why the line is not used, or empty.
+  [[nodiscard]] std::string add(std::string_view line);
+  /// In the order in which they first appear.
+  [[nodiscard]] const std::vector<Source>& sources() const noexcept { return sources_; }
+  /// The source of that name; without a name the one with the most lines (the first of equals).
+  /// Null: there is none.
+  [[nodiscard]] const Source* pick(std::string_view name) const noexcept;
+  /// "ptp4l (62 lines), phc2sys CLOCK_REALTIME (61 lines)".
+  [[nodiscard]] std::string describe_sources() const;
+
+ private:
+  std::vector<Source> sources_;
+};
+
+/// Is it a summary of several offsets, "rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1" (ptp4l and
+/// phc2sys with a summary interval)? The single offsets are not in it.
+[[nodiscard]] bool is_summary_line(std::string_view line);
 
 /// Does the line come from one of these programs?
 [[nodiscard]] bool is_linuxptp_line(std::string_view line);

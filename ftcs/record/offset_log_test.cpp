@@ -29,6 +29,33 @@ TEST(OffsetLog, reads_phc2sys_and_syslog) {
   EXPECT_EQ(line->frequency_ppb, -5.0);
 }
 
+TEST(OffsetLog, tells_programs_and_clocks_of_one_journal_apart) {
+  OffsetLog log;
+  const char* lines[] = {
+      "ptp4l[1.0]: master offset 1 s2 freq +1 path delay 5",
+      "phc2sys[1.1]: CLOCK_REALTIME phc offset 2 s2 freq +1 delay 5",
+      "phc2sys[1.2]: eth1 sys offset 3 s2 freq +1 delay 5",
+      "phc2sys[2.1]: CLOCK_REALTIME phc offset 4 s2 freq +1 delay 5",
+      "ptp4l[1.0]: [second] master offset 5 s2 freq +1 path delay 5",
+      "ts2phc[1.3]: /dev/ptp1 master offset 6 s2 freq +1",
+      "Nov 21 09:00:00 host phc2sys[991]: [2.2] CLOCK_REALTIME phc offset 7 s2 freq -5 delay 4",
+  };
+  for (const char* line : lines) EXPECT_EQ(log.add(line), "") << line;
+  EXPECT_EQ(log.describe_sources(),
+            "ptp4l (1 lines), phc2sys CLOCK_REALTIME (3 lines), phc2sys eth1 (1 lines), "
+            "ptp4l [second] (1 lines), ts2phc /dev/ptp1 (1 lines)");
+  EXPECT_EQ(log.pick("")->name, "phc2sys CLOCK_REALTIME");
+  EXPECT_EQ(log.pick("phc2sys eth1")->lines.front().offset_ns, 3.0);
+  EXPECT_EQ(log.pick("chronyd"), nullptr);
+}
+
+TEST(OffsetLog, says_that_a_summary_holds_no_single_offsets) {
+  OffsetLog log;
+  const std::string complaint = log.add("ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1");
+  EXPECT_NE(complaint.find("summary"), std::string::npos);
+  EXPECT_EQ(log.add("ptp4l[2.0]: port 1: MASTER to UNCALIBRATED"), "no offset in it");
+}
+
 TEST(OffsetLog, leaves_other_lines_alone) {
   for (const char* text : {"", "ptp4l[1.0]: port 1: MASTER to UNCALIBRATED",
                            "ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1", "offset",

@@ -238,50 +238,66 @@ class TableReader {
   double origin_ = 0.0;
 };
 
+/// The offsets of one source of a linuxptp log, from its first locked state on.
 class LogReader {
  public:
-  explicit LogReader(Series& series) : series_(series) {}
+  LogReader(const SeriesOptions& options, Series& series) : options_(options), series_(series) {}
 
   void add(std::string_view line) {
-    const auto parsed = parse_offset_log_line(line);
-    if (!parsed) {
-      ++series_.lines_left_out;
-      return;
-    }
-    constexpr int kLocked = 2;
-    if (parsed->state >= kLocked && !locked_) {
-      locked_ = true;
-      before_lock_ = raw.values.size();
-      raw = {};
-      all_timed_ = true;
-    }
-    raw.values.push_back(parsed->offset_ns * 1e-9);
-    // A restarted program begins a new clock: times that go back end their use.
-    all_timed_ =
-        all_timed_ && parsed->time_s && (raw.times.empty() || *parsed->time_s >= raw.times.back());
-    if (all_timed_) raw.times.push_back(*parsed->time_s);
+    if (!log_.add(line).empty()) ++series_.lines_left_out;
   }
 
-  void finish() {
-    if (!all_timed_) raw.times.clear();
+  std::optional<ReadError> finish(const LineReader& reader) {
     series_.kind = RecordKind::kOffset;
-    series_.notes.push_back("a log of linuxptp: offsets in ns, local minus reference");
-    if (locked_ && before_lock_ > 0) {
-      series_.notes.push_back(std::to_string(before_lock_) +
-                              " offsets before the servo locked (s2) are left out");
+    if (log_.sources().empty()) return std::nullopt;  // said by the check for any number at all
+    const OffsetLog::Source* source = log_.pick(options_.source);
+    if (source == nullptr) {
+      ReadError error = reader.error_here("no offsets of " + quoted_excerpt(options_.source) +
+                                          ": the log has " + log_.describe_sources());
+      error.line = 0;
+      return error;
     }
-    if (!locked_) series_.notes.push_back("the servo never locked (s2): all offsets are taken");
-    if (!all_timed_)
-      series_.notes.push_back("not every line has an ascending time: equal intervals are assumed");
+    series_.notes.push_back("a log of linuxptp: offsets in ns, local minus reference");
+    if (log_.sources().size() > 1) {
+      series_.notes.push_back("the log has " + log_.describe_sources() + ": " + source->name +
+                              " is taken; --source chooses");
+    }
+    take(*source);
+    return std::nullopt;
   }
 
   RawSeries raw;
 
  private:
+  void take(const OffsetLog::Source& source) {
+    constexpr int kLocked = 2;
+    const auto first = std::find_if(source.lines.begin(), source.lines.end(),
+                                    [](const OffsetLogLine& l) { return l.state >= kLocked; });
+    const bool locked = first != source.lines.end();
+    const auto from = locked ? first : source.lines.begin();
+    // A restarted program begins a new clock: times that go back end their use.
+    bool all_timed = true;
+    for (auto line = from; line != source.lines.end(); ++line) {
+      raw.values.push_back(line->offset_ns * 1e-9);
+      all_timed =
+          all_timed && line->time_s && (raw.times.empty() || *line->time_s >= raw.times.back());
+      if (all_timed) raw.times.push_back(*line->time_s);
+    }
+    if (!all_timed) raw.times.clear();
+    if (from != source.lines.begin()) {
+      series_.notes.push_back(std::to_string(from - source.lines.begin()) +
+                              " offsets before the servo locked (s2) are left out");
+    }
+    if (!locked) series_.notes.emplace_back("the servo never locked (s2): all offsets are taken");
+    if (!all_timed) {
+      series_.notes.emplace_back(
+          "not every line has an ascending time: equal intervals are assumed");
+    }
+  }
+
+  const SeriesOptions& options_;
   Series& series_;
-  bool locked_ = false;
-  bool all_timed_ = true;
-  std::size_t before_lock_ = 0;
+  OffsetLog log_;
 };
 
 /// From raw values to the grid, and the last checks.
@@ -343,7 +359,7 @@ Result<Series, ReadError> read_series(const std::string& path, const SeriesOptio
   LineReader& reader = *opened;
   Series series;
   TableReader table(reader, options, series);
-  LogReader log(series);
+  LogReader log(options, series);
   enum class Format { kUnknown, kTable, kLog } format = Format::kUnknown;
   while (const auto line = reader.next()) {
     const std::string_view text = trimmed(*line);
@@ -360,7 +376,9 @@ Result<Series, ReadError> read_series(const std::string& path, const SeriesOptio
     if (error) return *error;
   }
   if (reader.error()) return *reader.error();
-  if (format == Format::kLog) log.finish();
+  if (format == Format::kLog) {
+    if (auto error = log.finish(reader)) return *error;
+  }
   if (auto error = finish(std::move(format == Format::kLog ? log.raw : table.raw), options, reader,
                           series)) {
     return *error;

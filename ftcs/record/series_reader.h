@@ -30,6 +30,7 @@ struct SeriesOptions {
   std::string unit;         ///< of the values; empty = by heading (offset_ns), else by kind
   std::optional<RecordKind> kind;
   std::optional<double> interval_s;  ///< tau_0; else the median step of the times, else 1 s
+  std::string source;  ///< of a log with several: "phc2sys CLOCK_REALTIME"; empty = most lines
 };
 
 /// A record on a grid of equal intervals: what analysis takes.
@@ -49,7 +50,7 @@ struct Series {
 /// Times put the values on a grid of the interval: places without a value are gaps. Two values
 /// nearer than half an interval keep their order and take two places (counted in the notes). From
 /// the first locked state (s2) of a log on, all its offsets are taken; a log that never locks is
-/// taken whole.
+/// taken whole. Of several programs or clocks in one log one is taken, never a mixture.
 ///
 /// Errors: no such column, a field that is no number, a short line, times that go backwards, an
 /// unknown unit, no numbers at all, a gap that is larger than the record could explain; everything

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/record/units.h"
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <utility>
 
 namespace ftcs {
 namespace {
+
+/// What may stand around a unit in a heading.
+constexpr std::string_view kAround = "_/()[] ";
 
 using Unit = std::pair<std::string_view, double>;
 constexpr std::array<Unit, 6> kTimeUnits = {
@@ -28,7 +33,6 @@ std::optional<double> seconds_of_unit(std::string_view unit) { return find(kTime
 std::optional<double> fraction_of_unit(std::string_view unit) { return find(kFractionUnits, unit); }
 
 std::string unit_in_heading(std::string_view heading) {
-  constexpr std::string_view kAround = "_/()[] ";
   const auto last = heading.find_last_not_of(kAround);
   if (last == std::string_view::npos) return {};
   const auto before = heading.find_last_of(kAround, last);
@@ -37,6 +41,18 @@ std::string unit_in_heading(std::string_view heading) {
   // "column 1" is no unit.
   const bool known = word != "1" && (seconds_of_unit(word) || fraction_of_unit(word));
   return known ? std::string(word) : std::string();
+}
+
+std::string name_in_heading(std::string_view heading) {
+  const std::string unit = unit_in_heading(heading);
+  std::string name(heading.substr(0, unit.empty() ? heading.size() : heading.rfind(unit)));
+  name.erase(std::find_if_not(name.rbegin(), name.rend(),
+                              [](char c) { return kAround.find(c) != std::string_view::npos; })
+                 .base(),
+             name.end());
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
+  return name;
 }
 
 }  // namespace ftcs

@@ -17,4 +17,7 @@ namespace ftcs {
 /// if there is none.
 [[nodiscard]] std::string unit_in_heading(std::string_view heading);
 
+/// The heading in small letters and without its unit: "offset" of "Offset (ns)" and "offset_ns".
+[[nodiscard]] std::string name_in_heading(std::string_view heading);
+
 }  // namespace ftcs

@@ -70,6 +70,7 @@ Json plot_json(const Plot& plot) {
   json["y_label"] = plot.y_label;
   json["log_x"] = plot.log_x;
   json["log_y"] = plot.log_y;
+  json["y_extent"] = plot.y_extent;
   json["style"] = style_name(plot.style);
   json["bands"] = std::any_of(plot.series.begin(), plot.series.end(),
                               [](const PlotSeries& series) { return !series.lower.empty(); });

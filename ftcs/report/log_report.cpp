@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/report/log_report.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -16,21 +20,87 @@ std::string usage_text(const experiment::RecordedLog& log) {
       log.lines, log.used, log.unusable, log.pairs.size(), log.interval_s);
 }
 
+/// In lines of a terminal; what a browser folds by itself.
 constexpr const char* kMeaning =
-    "offset: measured before each update, the record's own noise included; second half of the "
-    "record";
+    "All figures are of the second half of the record.\n"
+    "TE: true time error. Offset: measured before each update, the record's own noise included.\n"
+    "Median and 95 %: of |TE| where the record tells the truth, else of |offset|.\n"
+    "Within sigma: how often the estimate was within 1, 2, 3 of the deviations the servo stated.";
+
+/// "68 / 95 / 99.7 %"; a gap where nothing can be judged.
+std::string coverage_text(const std::array<double, 3>& within) {
+  if (!std::isfinite(within[0])) return "-";
+  return fmt::format("{:.0f} / {:.0f} / {:.1f} %", 100 * within[0], 100 * within[1],
+                     100 * within[2]);
+}
+
+/// What the recorded clock's own servo commanded is not in the record.
+Cell count_of(const experiment::ReplayResult& servo, std::uint64_t count) {
+  return servo.servo == experiment::kAsRecorded ? Cell("-") : Cell::count(count);
+}
+
+/// Largest |value| from the middle of the record on: the half that is counted sets the scale, and
+/// not the first second of a clock that began a millisecond away.
+double counted_extent(const std::vector<double>& values) {
+  double extent = 0.0;
+  for (std::size_t i = values.size() / 2; i < values.size(); ++i)
+    if (std::isfinite(values[i])) extent = std::max(extent, std::abs(values[i]));
+  return extent;
+}
+
+Plot offset_plot(const LogComparison& comparison) {
+  Plot plot;
+  plot.title = "Measured offset of the steered clock";
+  plot.x_label = "time / s";
+  plot.y_label = "local minus reference / ns";
+  for (const auto& servo : comparison.servos) {
+    if (servo.servo == "none") continue;
+    plot.series.push_back({servo.servo, servo.time_s, servo.offset_ns, {}, {}});
+    plot.y_extent = std::max(plot.y_extent, counted_extent(servo.offset_ns));
+  }
+  plot.note = "The scale is that of the second half, which is counted; the start may go beyond it.";
+  return plot;
+}
+
+/// True error, and the deviation that the servo states: honest where the error stays between its
+/// lines.
+Plot error_plot(const LogComparison& comparison) {
+  Plot plot;
+  plot.title = "True time error, with the stated deviation (3 sigma)";
+  plot.x_label = "time / s";
+  plot.y_label = "local minus reference / ns";
+  for (const auto& servo : comparison.servos) {
+    if (servo.servo == "none") continue;
+    plot.series.push_back({servo.servo, servo.time_s, servo.time_error_ns, {}, {}});
+    plot.y_extent = std::max(plot.y_extent, counted_extent(servo.time_error_ns));
+    const bool stated = std::any_of(servo.sigma_ns.begin(), servo.sigma_ns.end(),
+                                    [](double sigma) { return std::isfinite(sigma); });
+    for (const double side : {3.0, -3.0}) {
+      if (!stated) continue;
+      PlotSeries edge{
+          fmt::format("{}, {:+.0f} sigma", servo.servo, side), servo.time_s, {}, {}, {}};
+      for (const double sigma : servo.sigma_ns) edge.y.push_back(side * sigma);
+      plot.y_extent = std::max(plot.y_extent, counted_extent(edge.y));
+      plot.series.push_back(std::move(edge));
+    }
+  }
+  return plot;
+}
 
 }  // namespace
 
 Table log_table(const LogComparison& comparison) {
-  Table table({"servo", "RMS TE / ns", "max |TE| / ns", "RMS offset / ns", "max / ns",
-               "rate spread / ppb", "commands", "steps", "rejected"});
+  Table table({"servo", "RMS TE / ns", "max |TE| / ns", "median / ns", "95 % / ns",
+               "RMS offset / ns", "max / ns", "within 1, 2, 3 sigma", "rate spread / ppb",
+               "commands", "steps", "rejected"});
   for (const auto& servo : comparison.servos) {
     table.add_row({servo.servo, Cell::significant(servo.rms_time_error_ns),
-                   Cell::significant(servo.max_time_error_ns),
+                   Cell::significant(servo.max_time_error_ns), Cell::significant(servo.median_ns),
+                   Cell::significant(servo.percentile_95_ns),
                    Cell::significant(servo.rms_offset_ns), Cell::significant(servo.max_offset_ns),
-                   Cell::significant(servo.rate_spread_ppb, 3), Cell::count(servo.commands),
-                   Cell::count(servo.steps), Cell::count(servo.rejected)});
+                   coverage_text(servo.within_sigma), Cell::significant(servo.rate_spread_ppb, 3),
+                   count_of(servo, servo.commands), count_of(servo, servo.steps),
+                   count_of(servo, servo.rejected)});
   }
   return table;
 }
@@ -56,6 +126,11 @@ Json log_json(const LogComparison& comparison, const std::string& version) {
                       {"samples", servo.samples},
                       {"rms_time_error_ns", number(servo.rms_time_error_ns)},
                       {"max_time_error_ns", number(servo.max_time_error_ns)},
+                      {"median_ns", number(servo.median_ns)},
+                      {"percentile_95_ns", number(servo.percentile_95_ns)},
+                      {"within_1_sigma", number(servo.within_sigma[0])},
+                      {"within_2_sigma", number(servo.within_sigma[1])},
+                      {"within_3_sigma", number(servo.within_sigma[2])},
                       {"rms_offset_ns", number(servo.rms_offset_ns)},
                       {"max_offset_ns", number(servo.max_offset_ns)},
                       {"rate_spread_ppb", number(servo.rate_spread_ppb)},
@@ -68,6 +143,8 @@ Json log_json(const LogComparison& comparison, const std::string& version) {
               {"log",
                {{"file", comparison.file},
                 {"format", log.format},
+                {"source", log.source},
+                {"steered", log.steered},
                 {"two_way", log.two_way},
                 {"lines", log.lines},
                 {"used", log.used},
@@ -83,15 +160,8 @@ Json log_json(const LogComparison& comparison, const std::string& version) {
 std::string log_html(const LogComparison& comparison, const std::string& version) {
   HtmlReport report("What would my clock have done?", comparison.file);
   report.add_table("Servos on this record", log_table(comparison), kMeaning);
-  Plot plot;
-  plot.title = "Measured offset of the steered clock";
-  plot.x_label = "time / s";
-  plot.y_label = "local minus reference / ns";
-  for (const auto& servo : comparison.servos) {
-    if (servo.servo != "none")
-      plot.series.push_back({servo.servo, servo.time_s, servo.offset_ns, {}, {}});
-  }
-  report.add_plot(plot);
+  report.add_plot(offset_plot(comparison));
+  if (comparison.log.has_truth) report.add_plot(error_plot(comparison));
   report.add_note(usage_text(comparison.log));
   for (const auto& note : comparison.log.notes) report.add_note(note);
   for (const auto& line : comparison.log.examples) {
@@ -99,6 +169,21 @@ std::string log_html(const LogComparison& comparison, const std::string& version
   }
   report.add_parameters({{"file", comparison.file}, {"version", version}});
   return report.render();
+}
+
+std::string log_trace_csv(const LogComparison& comparison) {
+  std::string text = "servo,time_s,offset_ns,time_error_ns,sigma_ns\n";
+  const auto value = [](double x) {
+    return std::isfinite(x) ? fmt::format("{}", x) : std::string();
+  };
+  for (const auto& servo : comparison.servos) {
+    for (std::size_t i = 0; i < servo.time_s.size(); ++i) {
+      text +=
+          fmt::format("{},{},{},{},{}\n", servo.servo, servo.time_s[i], value(servo.offset_ns[i]),
+                      value(servo.time_error_ns[i]), value(servo.sigma_ns[i]));
+    }
+  }
+  return text;
 }
 
 }  // namespace ftcs

@@ -22,6 +22,9 @@ struct LogComparison {
 [[nodiscard]] std::string log_console(const LogComparison& comparison);
 /// {"log": {...}, "servos": [...]}.
 [[nodiscard]] Json log_json(const LogComparison& comparison, const std::string& version);
+/// Every sample of every servo: servo, time_s, offset_ns, time_error_ns, sigma_ns; what is not
+/// known is empty.
+[[nodiscard]] std::string log_trace_csv(const LogComparison& comparison);
 [[nodiscard]] std::string log_html(const LogComparison& comparison, const std::string& version);
 
 }  // namespace ftcs

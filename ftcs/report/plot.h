@@ -37,7 +37,8 @@ struct Plot {
   bool log_y = false;
   PlotStyle style = PlotStyle::kLine;
   std::vector<PlotSeries> series;
-  std::string note;  ///< a sentence under the plot
+  std::string note;       ///< a sentence under the plot
+  double y_extent = 0.0;  ///< the picture begins with y from -y_extent to y_extent; 0: all of it
 };
 
 /// At most two points for each of `buckets` equal runs of points: its smallest and its largest y,

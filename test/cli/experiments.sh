@@ -99,6 +99,13 @@ expect 1 'binary.toml' analyse binary.toml
 expect 1 'none.csv' analyse none.csv
 
 # A full disk takes one result, never the others or the console's table.
+# A record is one run: options that draw, share or join runs mean nothing to it, and others must be honoured.
+expect 2 '--log excludes --seeds' compare --log good.csv --seeds 3
+expect 2 '--log excludes --shard' compare --log good.csv --shard 1/2
+expect 2 '--servo nobody' compare --log good.csv --servo nobody
+expect 1 "no source 'ptp4l'" compare --log good.csv --source ptp4l
+"$ftcs" compare -q --log good.csv --servo ftcs --trace replay.csv || fail "compare --log --trace"
+[ "$(cut -d, -f1 replay.csv | sort -u | tr '\n' ' ')" = "ftcs servo " ] || fail "the trace is not of the servo asked for"
 expect 1 'No space left on device' compare --log good.csv -q --json /dev/full --csv kept-log.csv
 expect 1 'No space left on device' compare good.toml -q --html /dev/full --json kept-compare.json
 expect 1 'No space left on device' analyse good.csv -q --json /dev/full --csv kept-analyse.csv

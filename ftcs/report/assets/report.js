@@ -90,6 +90,8 @@
     }
     if (plot.log_y) {
       options.valueRange = padded(all(plot, ['y', 'lower', 'upper']));
+    } else if (plot.y_extent > 0) {
+      options.valueRange = [-1.1 * plot.y_extent, 1.1 * plot.y_extent];
       options.axes.y.ticker = decades;
     }
     Object.assign(options, colours(plot));
