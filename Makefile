@@ -2,6 +2,7 @@
 # make demo       install what is missing, build, watch a clock and eight drives being locked; build/demo.html
 # make test       install what is missing, build, test (at most 5 minutes after the build)
 # make test-all   everything, long runs too
+# make test-vm    real clocks of a real kernel in a virtual machine: docs/vm.md (at most 10 minutes); JOB=busy: one job of it
 # make bench      nanoseconds and instructions per update, allocations
 # make check      formatting, spelling, layers; make check-tidy: clang-tidy too
 # make fuzz       each fuzz target for FUZZ_SECONDS
@@ -11,8 +12,11 @@ CMAKE_FLAGS ?=
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 DEMO_FLAGS ?=
 FUZZ_SECONDS ?= 60
+JOB ?=
+VM_LABEL ?= vm
+VM_FLAGS ?=
 
-.PHONY: all configure build demo test test-all bench check check-tidy fuzz mutate deps deps-test clean
+.PHONY: all configure build demo test test-all test-vm bench check check-tidy fuzz mutate deps deps-test clean
 
 all: build
 
@@ -33,10 +37,19 @@ demo: build
 
 test: deps-test configure
 	@cmake --build build -j $(JOBS)
-	@ctest --test-dir build -j $(JOBS) --output-on-failure -LE slow
+	@ctest --test-dir build -j $(JOBS) --output-on-failure -LE '^(slow|vm)$$'
 
 test-all: test
 	@ctest --test-dir build -j $(JOBS) --output-on-failure -L slow
+
+test-vm: deps-test configure
+	@cmake --build build -j $(JOBS) --target ftcs vm_witness
+	@test/vm/prepare build/vm || { code=$$?; [ $$code -eq 77 ] && exit 0; exit $$code; }
+ifeq ($(JOB),)
+	@ctest --test-dir build -j $(JOBS) --output-on-failure -L '^$(VM_LABEL)$$'
+else
+	@test/vm/run $(VM_FLAGS) $(JOB)
+endif
 
 bench: deps-test
 	@cmake --preset release > /dev/null
