@@ -209,9 +209,11 @@ void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
   std::optional<FreeRunningTime> sent;
   if (message.stamp) {
     sent = oscillator_.from_underlying(message.stamp->time) + Duration{options_.egress_latency};
-  } else {
+  } else if (!std::exchange(stamp_missed_, true)) {
     log_(LogLevel::kWarning,
-         "port 1 ({}): no transmit timestamp within {} ms (tx_timestamp_timeout)",
+         "port 1 ({}): no transmit timestamp within {} ms (tx_timestamp_timeout); one that comes "
+         "later "
+         "is used, further ones are only counted",
          options_.interface,
          std::chrono::duration_cast<std::chrono::milliseconds>(options_.socket.tx_timestamp_timeout)
              .count());

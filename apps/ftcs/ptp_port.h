@@ -118,6 +118,7 @@ class PtpPort : private platform::TransportHandler {
   platform::SocketAddress sender_{};  ///< of the message that is being handled
   platform::SocketAddress transmitter_{};
   std::optional<platform::StampSource> reported_stamps_{};
+  bool stamp_missed_ = false;
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take
   std::optional<std::string> failure_{};

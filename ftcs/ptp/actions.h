@@ -26,7 +26,7 @@ enum class Destination : std::uint8_t {
 };
 
 /// Send these octets. For Channel::kEvent the shell answers with on_transmit_timestamp(id, ...) or,
-/// if the stamp never comes, on_transmit_timestamp_missing(id, ...).
+/// if the stamp is overdue, on_transmit_timestamp_missing(id, ...), which a late stamp may follow.
 struct SendMessage {
   Channel channel = Channel::kGeneral;
   Destination destination = Destination::kMulticast;

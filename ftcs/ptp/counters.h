@@ -72,7 +72,8 @@ enum class Counter : std::uint8_t {
   kStaleDelayResp,  ///< nothing outstanding with this sequence id (late, duplicate or forged):
                     ///< dropped
   kLostDelayResp,   ///< a request that was never answered: forgotten
-  kMissingTransmitStamp,     ///< the exchange (receiver) or the Follow_Up (transmitter) is left out
+  kMissingTransmitStamp,     ///< overdue: the exchange (receiver) or the Follow_Up (transmitter) is
+                             ///< left out until it comes
   kUnexpectedTransmitStamp,  ///< for a message that we do not wait for: ignored
   // Peer delay (11.4).
   kLostPdelayResp,          ///< a request that was never answered: forgotten

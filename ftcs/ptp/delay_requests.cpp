@@ -60,12 +60,9 @@ std::optional<EventPair> DelayRequests::on_sent(std::uint16_t sequence_id, FreeR
 
 void DelayRequests::on_stamp_missing(std::uint16_t sequence_id, Counters& counters) noexcept {
   Request* const request = find(sequence_id);
-  if (request == nullptr || request->sent) {
-    counters.add(Counter::kUnexpectedTransmitStamp);
-    return;
-  }
-  counters.add(Counter::kMissingTransmitStamp);
-  *request = Request{};
+  const bool awaited = request != nullptr && !request->sent && !request->overdue;
+  counters.add(awaited ? Counter::kMissingTransmitStamp : Counter::kUnexpectedTransmitStamp);
+  if (awaited) request->overdue = true;
 }
 
 std::optional<EventPair> DelayRequests::on_response(const Header& header, const DelayResp& response,
@@ -113,7 +110,8 @@ DelayRequests::Request* DelayRequests::find(std::uint16_t sequence_id) noexcept 
 }
 
 void DelayRequests::forget(Request& request, Counters& counters) noexcept {
-  if (request.open) counters.add(Counter::kLostDelayResp);
+  const bool stamp_is_what_was_missing = request.answered || (request.overdue && !request.sent);
+  if (request.open && !stamp_is_what_was_missing) counters.add(Counter::kLostDelayResp);
   request = Request{};
 }
 

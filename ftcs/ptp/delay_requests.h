@@ -35,7 +35,7 @@ class DelayRequests {
   std::optional<std::uint16_t> begin_if_due(FreeRunningTime now, Counters& counters) noexcept;
   std::optional<EventPair> on_sent(std::uint16_t sequence_id, FreeRunningTime sent,
                                    Counters& counters) noexcept;
-  /// The request is forgotten; the next one comes as planned.
+  /// The stamp is overdue, which is counted; one that comes later is used all the same.
   void on_stamp_missing(std::uint16_t sequence_id, Counters& counters) noexcept;
   std::optional<EventPair> on_response(const Header& header, const DelayResp& response,
                                        Counters& counters) noexcept;
@@ -48,6 +48,7 @@ class DelayRequests {
     bool open = false;
     bool sent = false;
     bool answered = false;
+    bool overdue = false;  ///< the stamp, and counted
     std::uint16_t sequence_id = 0;
     FreeRunningTime transmit{};
     ReferenceTime receive{};  ///< t4 - correction

@@ -33,7 +33,8 @@ struct Network {
   double missing_stamps = 0.0;
   Nanoseconds minimum_delay = 10us;
   Nanoseconds jitter = 0us;       ///< uniform, for each copy: more than the interval reorders
-  Nanoseconds stamp_delay = 5us;  ///< until a transmit stamp is known, uniform
+  Nanoseconds stamp_delay = 5us;  ///< until a transmit stamp is known or missed, uniform; of the
+                                  ///< missed ones half come at three times that
 };
 
 class World {
@@ -167,12 +168,14 @@ class World {
       if (!event) continue;
       const bool missing = chance() < network_.missing_stamps;
       const int generation = transmitter_generation_;
-      at(now_ + uniform(network_.stamp_delay), [this, message, sent, missing, generation] {
+      const auto give = [this, message, sent, generation](bool stamp) {
         if (!transmitter_ || generation != transmitter_generation_) return;
-        perform_transmitter(missing
-                                ? transmitter_->on_transmit_timestamp_missing(message.id(), raw())
-                                : transmitter_->on_transmit_timestamp(message.id(), sent, raw()));
-      });
+        perform_transmitter(stamp
+                                ? transmitter_->on_transmit_timestamp(message.id(), sent, raw())
+                                : transmitter_->on_transmit_timestamp_missing(message.id(), raw()));
+      };
+      at(now_ + uniform(network_.stamp_delay), [give, missing] { give(!missing); });
+      if (missing && chance() < 0.5) at(now_ + 3 * network_.stamp_delay, [give] { give(true); });
     }
   }
 
@@ -200,10 +203,12 @@ class World {
     }
     if (!event) return;
     const bool missing = chance() < network_.missing_stamps;
-    at(now_ + uniform(network_.stamp_delay), [this, message, sent, missing] {
-      perform(missing ? receiver_->on_transmit_timestamp_missing(message.id(), local())
-                      : receiver_->on_transmit_timestamp(message.id(), sent, local()));
-    });
+    const auto give = [this, message, sent](bool stamp) {
+      perform(stamp ? receiver_->on_transmit_timestamp(message.id(), sent, local())
+                    : receiver_->on_transmit_timestamp_missing(message.id(), local()));
+    };
+    at(now_ + uniform(network_.stamp_delay), [give, missing] { give(!missing); });
+    if (missing && chance() < 0.5) at(now_ + 3 * network_.stamp_delay, [give] { give(true); });
   }
 
   void check(const EventPair& pair) {

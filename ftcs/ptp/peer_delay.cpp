@@ -77,7 +77,7 @@ void PeerDelay::close_exchange(Port& port) noexcept {
     if (losses_ > config_.allowed_losses) forget_rate();
   } else if (exchange_.two_step && !exchange_.followed_up) {
     port.count(Counter::kLostPdelayRespFollowUp);
-  } else if (!exchange_.sent && !exchange_.several) {
+  } else if (!exchange_.sent && !exchange_.overdue && !exchange_.several) {
     port.count(Counter::kMissingTransmitStamp);
   }
 }
@@ -118,8 +118,8 @@ void PeerDelay::on_request(const Header& header, FreeRunningTime received, Port&
   message.header.correction = -fraction_of(on_wire(received));
   Answer& answer = answers_[next_answer_];
   next_answer_ = (next_answer_ + 1) % kOpenAnswers;
-  if (answer.open) port.count(Counter::kMissingTransmitStamp);
-  answer = Answer{true, true, id, header.correction};
+  if (answer.open && !answer.overdue) port.count(Counter::kMissingTransmitStamp);
+  answer = Answer{true, true, false, id, header.correction};
   port.send(message, Destination::kNeighbour, Counter::kPdelayRespSent, actions);
 }
 
@@ -206,17 +206,17 @@ void PeerDelay::on_sent(const EventId& id, FreeRunningTime sent, Port& port,
 }
 
 void PeerDelay::on_stamp_missing(const EventId& id, Port& port) noexcept {
+  bool* overdue = nullptr;
   if (id.type == MessageType::kPdelayReq) {
     const bool awaited =
         exchange_.open && !exchange_.sent && exchange_.sequence_id == id.sequence_id;
-    port.count(awaited ? Counter::kMissingTransmitStamp : Counter::kUnexpectedTransmitStamp);
-    if (awaited) exchange_.open = false;
-    return;
+    if (awaited) overdue = &exchange_.overdue;
+  } else if (Answer* const answer = find_answer(id)) {
+    overdue = &answer->overdue;
   }
-  Answer* const answer = find_answer(id);
-  port.count(answer == nullptr ? Counter::kUnexpectedTransmitStamp
-                               : Counter::kMissingTransmitStamp);
-  if (answer != nullptr) answer->open = false;
+  const bool news = overdue != nullptr && !*overdue;
+  port.count(news ? Counter::kMissingTransmitStamp : Counter::kUnexpectedTransmitStamp);
+  if (news) *overdue = true;
 }
 
 PeerDelay::Answer* PeerDelay::find_answer(const EventId& id) noexcept {

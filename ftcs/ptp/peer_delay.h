@@ -57,6 +57,7 @@ class PeerDelay {
                   ActionList& actions) noexcept;
   /// Of a Pdelay_Req or a Pdelay_Resp.
   void on_sent(const EventId& id, FreeRunningTime sent, Port& port, ActionList& actions) noexcept;
+  /// It is overdue, which is counted; one that comes later is used all the same.
   void on_stamp_missing(const EventId& id, Port& port) noexcept;
 
   /// Rate of the reference in units of the neighbour's clock: what is emitted is by the reference.
@@ -79,6 +80,7 @@ class PeerDelay {
   struct Exchange {
     bool open = false;
     bool sent = false;
+    bool overdue = false;  ///< our stamp, and counted
     bool answered = false;
     bool two_step = false;
     bool followed_up = false;
@@ -97,7 +99,8 @@ class PeerDelay {
   /// copy of the request is not answered with other stamps.
   struct Answer {
     bool known = false;
-    bool open = false;  ///< the stamp is awaited
+    bool open = false;     ///< the stamp is awaited
+    bool overdue = false;  ///< and counted
     EventId id{};
     Duration correction{};  ///< of the request
   };

@@ -372,8 +372,24 @@ TEST_F(PeerDelayTest, two_neighbours_with_one_sequence_id_are_kept_apart) {
   EXPECT_EQ(std::get<PdelayRespFollowUp>(read->body).requesting_port, kStranger);
   peer_.on_stamp_missing(first[0].id(), port_);
   EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
-  peer_.on_sent(first[0].id(), ours(2s), port_, actions);
+  peer_.on_stamp_missing(first[0].id(), port_);
   EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
+}
+
+TEST_F(PeerDelayTest, a_transmit_stamp_that_comes_after_its_timeout_is_used) {
+  const auto id = ask(0s);
+  peer_.on_stamp_missing({MessageType::kPdelayReq, id, {}}, port_);
+  static_cast<void>(hand_over(response(id, kLink), kTurnAround));
+  static_cast<void>(hand_over(follow_up(id, kLink + kTurnAround), kTurnAround));
+  EXPECT_EQ(of<EmitPeerDelay>(stamp(id, 0s)).size(), 1U);
+  const auto answer = of<SendMessage>(hand_over(message(5, PdelayReq{}), 1s));
+  ASSERT_EQ(answer.size(), 1U);
+  peer_.on_stamp_missing(answer[0].id(), port_);
+  ActionList actions;
+  peer_.on_sent(answer[0].id(), ours(1s), port_, actions);
+  EXPECT_EQ(of<SendMessage>(actions).size(), 1U) << "the Pdelay_Resp_Follow_Up";
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 2U);
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 0U);
 }
 
 TEST_F(PeerDelayTest, a_copy_of_a_request_is_answered_once) {

@@ -154,10 +154,40 @@ TEST_F(Receiver, a_missing_transmit_stamp_leaves_the_exchange_out) {
       receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, id}, local(1s)).empty());
   EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
   EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
-  EXPECT_TRUE(
-      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)).empty());
-  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
   EXPECT_TRUE(receiver_.deadline().has_value()) << "the next request comes as planned";
+  for (int i = 0; i < 4; ++i) static_cast<void>(receiver_.on_timer(*receiver_.deadline()));
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U) << "counted once";
+  EXPECT_EQ(count(Counter::kLostDelayResp), 0U) << "the answer came";
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(9s)));
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U) << "four requests later";
+}
+
+// A driver that is slow with its stamps is slower than tx_timestamp_timeout with each of them.
+TEST_F(Receiver, a_transmit_stamp_that_comes_after_its_timeout_is_used) {
+  select_a();
+  auto asked = of<SendMessage>(event(sync_from(kA, 0), 1s));
+  for (const bool answered_first : {true, false}) {
+    ASSERT_EQ(asked.size(), 1U);
+    const auto id = asked[0].sequence_id;
+    static_cast<void>(
+        receiver_.on_transmit_timestamp_missing({MessageType::kDelayReq, id}, local(1s)));
+    if (answered_first) {
+      EXPECT_TRUE(general(delay_resp(id, 1s), 1s).empty());
+    }
+    auto pairs = of<EmitPair>(
+        receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(900ms), local(1s)));
+    if (!answered_first) {
+      EXPECT_TRUE(pairs.empty());
+      pairs = of<EmitPair>(general(delay_resp(id, 1s), 1s));
+    }
+    ASSERT_EQ(pairs.size(), 1U);
+    EXPECT_EQ(pairs[0].pair.direction, Direction::kBackward);
+    EXPECT_EQ(pairs[0].pair.free_running, local(900ms));
+    asked = of<SendMessage>(receiver_.on_timer(*receiver_.deadline()));
+  }
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 0U);
+  EXPECT_EQ(count(Counter::kLostDelayResp), 0U);
 }
 
 // Messages that are not for us.

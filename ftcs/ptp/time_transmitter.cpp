@@ -89,8 +89,9 @@ ActionList TimeTransmitter::on_transmit_timestamp_missing(const EventId& id,
     return {};
   }
   OpenSync* const sync = find(id.sequence_id);
-  port_.count(sync == nullptr ? Counter::kUnexpectedTransmitStamp : Counter::kMissingTransmitStamp);
-  if (sync != nullptr) *sync = OpenSync{};
+  const bool awaited = sync != nullptr && !sync->overdue;
+  port_.count(awaited ? Counter::kMissingTransmitStamp : Counter::kUnexpectedTransmitStamp);
+  if (awaited) sync->overdue = true;
   return {};
 }
 
@@ -204,7 +205,7 @@ void TimeTransmitter::send_sync(ActionList& actions) noexcept {
   message.header.flags |= flag::kTwoStep;
   // Ids are consecutive: this place belongs to the Sync four before.
   OpenSync& sync = open_syncs_[sequence_id % kOpenSyncs];
-  if (sync.open) port_.count(Counter::kMissingTransmitStamp);
+  if (sync.open && !sync.overdue) port_.count(Counter::kMissingTransmitStamp);
   sync = OpenSync{true, sequence_id};
   port_.send(message, Destination::kMulticast, Counter::kSyncSent, actions);
 }

@@ -76,6 +76,7 @@ class TimeTransmitter {
   struct OpenSync {
     bool open = false;
     std::uint16_t sequence_id = 0;
+    bool overdue = false;  ///< its stamp, and counted
   };
   /// Transmit stamps may lag behind by as many Syncs.
   static constexpr std::size_t kOpenSyncs = 4;

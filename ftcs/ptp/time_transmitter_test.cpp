@@ -151,10 +151,23 @@ TEST_F(Transmitter, without_a_stamp_no_follow_up_is_sent) {
   EXPECT_TRUE(
       transmitter_.on_transmit_timestamp_missing({MessageType::kSync, id}, raw(0s)).empty());
   EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U);
+  EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
+  for (int i = 0; i < 4; ++i) static_cast<void>(transmitter_.on_timer(*transmitter_.deadline()));
+  EXPECT_EQ(count(Counter::kMissingTransmitStamp), 1U) << "counted once";
   EXPECT_TRUE(
       transmitter_.on_transmit_timestamp({MessageType::kSync, id}, reference(0s), raw(0s)).empty());
-  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U);
-  EXPECT_EQ(count(Counter::kFollowUpSent), 0U);
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 1U) << "four Syncs later";
+}
+
+TEST_F(Transmitter, a_stamp_that_comes_after_its_timeout_is_still_that_of_its_sync) {
+  const auto id = sent(transmitter_.on_timer(raw(0s)))[1].how.sequence_id;
+  static_cast<void>(transmitter_.on_transmit_timestamp_missing({MessageType::kSync, id}, raw(0s)));
+  const auto follow =
+      sent(transmitter_.on_transmit_timestamp({MessageType::kSync, id}, reference(0s), raw(30ms)));
+  ASSERT_EQ(follow.size(), 1U);
+  EXPECT_EQ(follow[0].message.header.sequence_id, id);
+  EXPECT_EQ(std::get<FollowUp>(follow[0].message.body).precise_origin, reference(0s));
+  EXPECT_EQ(count(Counter::kUnexpectedTransmitStamp), 0U);
 }
 
 TEST_F(Transmitter, a_stamp_that_never_comes_is_counted_when_its_place_is_needed) {
