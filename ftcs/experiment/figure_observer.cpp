@@ -65,11 +65,12 @@ void FigureObserver::on_pair(const sim::PairSample& sample) {
   const bool holdover = telemetry.servo.state == ServoState::kHoldover;
   if (holdover && !in_holdover_) ++holdovers_;
   in_holdover_ = holdover;
-  if (plan_.at_samples && telemetry.direction == Direction::kForward) {
+  const bool is_sync = telemetry.direction == Direction::kForward && sample.paces;
+  if (plan_.at_samples && is_sync) {
     add_truth(sample.cycle, sample.time_s, sample.time_error_ns);
   }
   if (!measured(sample.cycle) || !telemetry.servo.offset_known) return;
-  if (telemetry.direction == Direction::kForward) perceived_.add(telemetry.servo.offset.ns());
+  if (is_sync) perceived_.add(telemetry.servo.offset.ns());
   judge_uncertainty(sample);
 }
 

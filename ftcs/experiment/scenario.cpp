@@ -148,6 +148,11 @@ Scenario read_scenario(TomlTable root, const std::string& file, const std::strin
   scenario.name = name;
   scenario.title = root.text("title").value_or(name);
   scenario.network = root.word("network", {"two-way", "one-way", "ptp"}).value_or("two-way");
+  const auto delay = root.word("delay", {"e2e", "p2p"});
+  if (delay && scenario.network != "ptp") {
+    root.fail("delay", "delay says how PTP ports measure it", "for network = \"ptp\" only");
+  }
+  scenario.world.peer_to_peer = delay == "p2p";
   scenario.notes = root.texts("notes");
   scenario.world.two_way = scenario.network != "one-way";
   scenario.world.interval = read_interval(root);

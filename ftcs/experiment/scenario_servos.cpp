@@ -182,6 +182,11 @@ void add_bound(TomlTable& root, Scenario& scenario) {
     read_kalman_noise(*table, bound.config.kalman.noise);
     table->finish();
     if (!wanted) return;
+  } else if (scenario.world.peer_to_peer) {
+    scenario.notes.emplace_back(
+        "No known-noise bound here: the filter would be given the Syncs and a mean link delay, and "
+        "not the peer delay messages. The end-to-end row has it.");
+    return;
   } else if (!has_linear_bound(scenario)) {
     scenario.notes.emplace_back(
         "No known-noise bound here: this clock is no linear noise process. [bound] sets one.");

@@ -65,6 +65,16 @@ TEST(Scenario, mistakes_are_named_with_their_line) {
       std::string::npos);
 }
 
+TEST(Scenario, only_ports_that_exchange_octets_can_measure_the_delay_peer_to_peer) {
+  EXPECT_NE(complaint("delay = \"p2p\"\n" + kSmall).find("network = \"ptp\" only"),
+            std::string::npos);
+  EXPECT_NE(complaint("network = \"ptp\"\ndelay = \"pdelay\"\n" + kSmall).find("p2p"),
+            std::string::npos);
+  const auto wanted = parse_scenarios("network = \"ptp\"\ndelay = \"p2p\"\n" + kSmall, "a.toml");
+  EXPECT_TRUE(wanted[0].world.peer_to_peer);
+  EXPECT_NE(wanted[0].servos.back().name, kBoundName) << "there is none to be had";
+}
+
 TEST(Scenario, times_may_be_given_in_cycles) {
   const auto scenarios = parse_scenarios(
       "[run]\nsync_interval = \"125 ms\"\ncycles = 10\n[path]\noutage = [{ from = \"4 cycles\", to "

@@ -11,7 +11,8 @@
 namespace ftcs::sim {
 
 /// The reference and the chain of clocks behind it, with the truth about them. What the messages
-/// between them are made of is for others (TwoWayRun: stamps alone; PtpRun: octets).
+/// between them are made of, and who steers the clocks, is for others (TwoWayRun: stamps alone into
+/// a discipline; PtpRun: octets into the node that ships).
 class Chain {
  public:
   Chain(const TwoWaySpec& spec, std::uint64_t seed, TwoWayObserver& observer)
@@ -47,31 +48,31 @@ class Chain {
     return ReferenceTime{upstream.clock.local_at(upstream.stamp(t)).since_epoch()};
   }
 
-  /// Hands a pair to the discipline of a node.
-  Telemetry feed(std::size_t index, TrueTime t, const EventPair& pair) {
-    const double error_ns = time_error_ns(index, t);
-    const Telemetry telemetry = nodes_[index]->feed(t, pair);
-    observer_.on_pair({index, cycle(t), t.since_epoch().seconds(), error_ns, &telemetry});
-    return telemetry;
+  /// True error of a node's clock: local minus reference.
+  [[nodiscard]] double time_error_ns(std::size_t index, TrueTime t) {
+    return offset_from_reference(nodes_[index]->local_at(t), reference_.at(t)).ns();
   }
 
-  /// Shows the truth about every clock.
-  void look(TrueTime t) {
+  /// Shows what came of one message. `error_ns`: true, before it was steered.
+  void show(std::size_t index, TrueTime t, double error_ns, const Telemetry& telemetry,
+            bool paces = true) {
+    observer_.on_pair({index, cycle(t), t.since_epoch().seconds(), error_ns, &telemetry, paces});
+  }
+
+  /// Shows the truth about every clock. `latest(index)`: the telemetry of who steers it.
+  template <class Latest>
+  void look(TrueTime t, const Latest& latest) {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      Node& node = *nodes_[i];
-      const Rate tracking =
-          node.discipline.latest().tracking_rate * node.oscillator.state_at(t).rate;
+      const Telemetry& telemetry = latest(i);
+      const Rate tracking = telemetry.tracking_rate * nodes_[i]->oscillator.state_at(t).rate;
       observer_.on_truth({i, cycle(t), t.since_epoch().seconds(), time_error_ns(i, t),
-                          tracking.ppb(), &node.discipline.latest()});
+                          tracking.ppb(), &telemetry});
     }
   }
 
  private:
   [[nodiscard]] double cycle(TrueTime t) const noexcept {
     return (t - start()).ns() / spec_.interval.ns();
-  }
-  [[nodiscard]] double time_error_ns(std::size_t index, TrueTime t) {
-    return offset_from_reference(nodes_[index]->local_at(t), reference_.at(t)).ns();
   }
 
   const TwoWaySpec& spec_;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //
-// The world: the shipped time transmitter and time receiver exchange octets over a link of 10 us;
-// behind the receiver a servo steers a virtual clock that starts 1 ms off on an oscillator that is
-// 50 ppm fast. The transmitter shows true time. Nothing is lost, no stamp has noise: what is shown
-// is how soon everything is known.
+// The world: the shipped time transmitter and receiver node exchange octets over a link of 10 us;
+// the node steers a virtual clock that starts 1 ms off on an oscillator that is 50 ppm fast. The
+// transmitter shows true time. Nothing is lost, no stamp has noise: what is shown is how soon
+// everything is known.
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -12,9 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/clock/virtual_clock.h"
-#include "ftcs/discipline/clock_discipline.h"
-#include "ftcs/measurement/link_delay.h"
-#include "ftcs/ptp/time_receiver.h"
+#include "ftcs/node/receiver_node.h"
 #include "ftcs/ptp/time_transmitter.h"
 #include "ftcs/sim/event_queue.h"
 #include "ftcs/sim/settable_source.h"
@@ -37,16 +35,7 @@ struct Start {
 
 class World {
  public:
-  explicit World(const Start& start)
-      : start_(start),
-        discipline_(discipline_config(start), clock_),
-        link_delay_(PathDelayConfig{}) {
-    ptp::TimeReceiverConfig receiver;
-    receiver.port = {ptp::ClockIdentity::from_mac({2, 0, 0, 0, 0, 2}), 1};
-    receiver.delay_mechanism = start.mechanism;
-    receiver.log_min_delay_req_interval = -3;
-    receiver.fast_start = start.fast;
-    receiver_.emplace(receiver);
+  explicit World(const Start& start) : start_(start), receiver_(receiver_config(start), clock_) {
     ptp::TimeTransmitterConfig transmitter;
     transmitter.port = {ptp::ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
     transmitter.delay_mechanism = start.mechanism;
@@ -55,7 +44,10 @@ class World {
     transmitter.log_min_delay_req_interval = -3;
     transmitter_.emplace(transmitter);
     at(0ns, [this] { transmit(transmitter_->start(raw())); });
-    at(start.joins, [this] { receive(receiver_->start(local())); });
+    at(start.joins, [this] {
+      receiver_.start(local());
+      receive();
+    });
   }
 
   void run_until(Nanoseconds end) {
@@ -72,8 +64,9 @@ class World {
       if (transmitter_->deadline() && *transmitter_->deadline() <= raw()) {
         transmit(transmitter_->on_timer(raw()));
       }
-      if (receiver_->deadline() && *receiver_->deadline() <= local()) {
-        receive(receiver_->on_timer(local()));
+      if (receiver_.deadline() && *receiver_.deadline() <= local()) {
+        receiver_.on_timer(local());
+        receive();
       }
     }
   }
@@ -85,13 +78,14 @@ class World {
   [[nodiscard]] std::optional<Nanoseconds> first_sync() const { return first_sync_; }
 
  private:
-  static DisciplineConfig discipline_config(const Start& start) {
-    DisciplineConfig config;
-    config.servo.kind = start.servo;
-    config.servo.ftcs.converged_dwell = 4;  // as ftcs ptp
-    if (start.mechanism == ptp::DelayMechanism::kPeerToPeer) {
-      config.servo.two_way.fixed_path_delay = 0ns;
-    }
+  static node::ReceiverNodeConfig receiver_config(const Start& start) {
+    node::ReceiverNodeConfig config;
+    config.port.port = {ptp::ClockIdentity::from_mac({2, 0, 0, 0, 0, 2}), 1};
+    config.port.delay_mechanism = start.mechanism;
+    config.port.log_min_delay_req_interval = -3;
+    config.port.fast_start = start.fast;
+    config.follower.discipline.servo.kind = start.servo;
+    config.follower.discipline.servo.ftcs.converged_dwell = 4;  // as ftcs ptp
     return config;
   }
   static VirtualClockConfig clock_config() {
@@ -127,9 +121,12 @@ class World {
         if (now_ < start_.joins) return;
         if (message.type == ptp::MessageType::kSync && !first_sync_) first_sync_ = now_;
         const auto bytes = message.bytes.view();
-        receive(message.channel == ptp::Channel::kEvent
-                    ? receiver_->on_event_message(bytes, local(), local())
-                    : receiver_->on_general_message(bytes, local()));
+        if (message.channel == ptp::Channel::kEvent) {
+          receiver_.on_event_message(bytes, local(), local());
+        } else {
+          receiver_.on_general_message(bytes, local());
+        }
+        receive();
       });
       if (sent->channel != ptp::Channel::kEvent) continue;
       at(now_ + kStampLatency, [this, id = sent->id(), stamp = reference()] {
@@ -137,45 +134,33 @@ class World {
       });
     }
   }
-  void receive(const ptp::ActionList& actions) {
-    for (const ptp::Action& action : actions) {
-      if (const auto* emitted = std::get_if<ptp::EmitPair>(&action)) follow(emitted->pair);
-      if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
-        EXPECT_TRUE(link_delay_.add(delay->mean_link_delay, delay->first));
-        if (waiting_) follow(*std::exchange(waiting_, std::nullopt));
-      }
-      const auto* sent = std::get_if<ptp::SendMessage>(&action);
-      if (sent == nullptr) continue;
-      at(now_ + kLink, [this, message = *sent] {
-        const auto bytes = message.bytes.view();
-        transmit(message.channel == ptp::Channel::kEvent
-                     ? transmitter_->on_event_message(bytes, reference(), raw())
-                     : transmitter_->on_general_message(bytes, raw()));
-      });
-      if (sent->channel != ptp::Channel::kEvent) continue;
-      at(now_ + kStampLatency, [this, id = sent->id(), stamp = local()] {
-        receive(receiver_->on_transmit_timestamp(id, stamp, local()));
-      });
+  /// What the node brought about.
+  void receive() {
+    while (const auto event = receiver_.next()) {
+      const auto* action = std::get_if<ptp::Action>(&*event);
+      const auto* sent = action != nullptr ? std::get_if<ptp::SendMessage>(action) : nullptr;
+      if (sent != nullptr) answer(*sent);
     }
   }
-  /// As ftcs ptp does it: peer to peer, the newest pair waits for the first delay.
-  void follow(EventPair pair) {
-    if (start_.mechanism == ptp::DelayMechanism::kPeerToPeer && !link_delay_.known()) {
-      waiting_ = pair;
-      return;
-    }
-    pair.reference = pair.reference + link_delay_.value();
-    static_cast<void>(discipline_.on_pair(pair));
+  void answer(const ptp::SendMessage& sent) {
+    at(now_ + kLink, [this, message = sent] {
+      const auto bytes = message.bytes.view();
+      transmit(message.channel == ptp::Channel::kEvent
+                   ? transmitter_->on_event_message(bytes, reference(), raw())
+                   : transmitter_->on_general_message(bytes, raw()));
+    });
+    if (sent.channel != ptp::Channel::kEvent) return;
+    at(now_ + kStampLatency, [this, id = sent.id(), stamp = local()] {
+      receiver_.on_transmit_timestamp(id, stamp, local());
+      receive();
+    });
   }
 
   Start start_;
   Nanoseconds now_{};
   SettableSource oscillator_;
   VirtualClock clock_{oscillator_, clock_config()};
-  ClockDiscipline discipline_;
-  LinkDelay link_delay_;
-  std::optional<EventPair> waiting_;
-  std::optional<ptp::TimeReceiver> receiver_;
+  node::ReceiverNode receiver_;
   std::optional<ptp::TimeTransmitter> transmitter_;
   EventQueue<std::function<void()>> queue_;
   std::optional<Nanoseconds> first_sync_;

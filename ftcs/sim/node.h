@@ -29,8 +29,8 @@ class ReferenceClock {
   Quantiser quantise_;
 };
 
-/// One steered clock of the chain: oscillator, virtual clock, discipline, and the links to its
-/// upstream.
+/// One steered clock of the chain: oscillator, virtual clock, and the links to its upstream. Who
+/// steers it is for others.
 class Node {
  public:
   Node(const NodeSpec& spec, std::uint64_t seed, std::uint64_t index)
@@ -39,7 +39,6 @@ class Node {
         backward(spec.backward, seed, 2 * index + 1),
         clock(source, {oscillator.reading_at(TrueTime{}), LocalTime{spec.initial_offset}, Rate{},
                        spec.limits}),
-        discipline(spec.discipline, clock),
         quantise_(spec.tick),
         stamp_noise_(seed, "stamp noise", index),
         stamp_noise_ns_(spec.stamp_noise_ns) {}
@@ -54,17 +53,14 @@ class Node {
     return quantise_(reading);
   }
   [[nodiscard]] LocalTime local_at(TrueTime t) { return clock.local_at(oscillator.reading_at(t)); }
-  Telemetry feed(TrueTime t, const EventPair& pair) {
-    source.set(oscillator.reading_at(t));
-    return discipline.on_pair(pair);
-  }
+  /// From now on the clock is read and steered at t.
+  void set_time(TrueTime t) { source.set(oscillator.reading_at(t)); }
 
   Oscillator oscillator;
   Link forward;
   Link backward;
   SettableSource source;
   VirtualClock clock;
-  ClockDiscipline discipline;
 
  private:
   Quantiser quantise_;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "ftcs/ptp/time_receiver.h"
+#include "ftcs/node/receiver_node.h"
 #include "ftcs/ptp/time_transmitter.h"
 #include "ftcs/sim/chain.h"
 #include "ftcs/sim/event_queue.h"
@@ -45,31 +45,44 @@ std::int8_t log_interval(Duration interval) {
   return static_cast<std::int8_t>(std::lround(std::log2(interval.seconds())));
 }
 
+ptp::DelayMechanism delay_mechanism(const TwoWaySpec& spec) {
+  return spec.peer_to_peer ? ptp::DelayMechanism::kPeerToPeer : ptp::DelayMechanism::kEndToEnd;
+}
+
 ptp::TimeTransmitterConfig transmitter_config(const TwoWaySpec& spec, std::size_t node) {
   ptp::TimeTransmitterConfig config;
   config.port = identity(node, Port::kTransmitter);
   config.log_sync_interval = log_interval(spec.interval);
   config.log_min_delay_req_interval = log_interval(spec.interval);
   config.log_announce_interval = log_interval(spec.interval);
+  config.delay_mechanism = delay_mechanism(spec);
+  config.peer_delay.log_min_interval = log_interval(spec.interval);
   return config;
 }
 
-ptp::TimeReceiverConfig receiver_config(const TwoWaySpec& spec, std::uint64_t seed,
-                                        std::size_t node) {
-  ptp::TimeReceiverConfig config;
-  config.port = identity(node, Port::kReceiver);
-  config.log_announce_interval = log_interval(spec.interval);
-  config.log_min_delay_req_interval = log_interval(spec.interval);
-  config.seed = seed * 1'000'003 + node + 1;
+node::ReceiverNodeConfig receiver_config(const TwoWaySpec& spec, std::uint64_t seed,
+                                         std::size_t node) {
+  node::ReceiverNodeConfig config;
+  config.port.port = identity(node, Port::kReceiver);
+  config.port.log_announce_interval = log_interval(spec.interval);
+  config.port.log_min_delay_req_interval = log_interval(spec.interval);
+  config.port.delay_mechanism = delay_mechanism(spec);
+  config.port.peer_delay.log_min_interval = log_interval(spec.interval);
+  config.port.seed = seed * 1'000'003 + node + 1;
+  config.follower.discipline = spec.nodes[node].discipline;
   return config;
 }
 
 /// A link of the chain: the transmitter at its upper end, the receiver at its lower one.
 struct Ports {
+  Ports(const ptp::TimeTransmitterConfig& transmits, const node::ReceiverNodeConfig& receives,
+        AdjustableClock& clock)
+      : transmitter(transmits), receiver(receives, clock) {}
+
   ptp::TimeTransmitter transmitter;
-  ptp::TimeReceiver receiver;
-  std::optional<TrueTime> transmitter_timer;  ///< armed for
-  std::optional<TrueTime> receiver_timer;
+  node::ReceiverNode receiver;
+  std::optional<TrueTime> transmitter_timer{};  ///< armed for
+  std::optional<TrueTime> receiver_timer{};
 };
 
 class PtpRun {
@@ -78,8 +91,7 @@ class PtpRun {
       : chain_(spec, seed, observer) {
     for (std::size_t i = 0; i < chain_.size(); ++i) {
       ports_.push_back(std::make_unique<Ports>(
-          Ports{ptp::TimeTransmitter(transmitter_config(spec, i)),
-                ptp::TimeReceiver(receiver_config(spec, seed, i)), std::nullopt, std::nullopt}));
+          transmitter_config(spec, i), receiver_config(spec, seed, i), chain_.node(i).clock));
       schedule_start(i, Port::kReceiver, TrueTime{});
       schedule_start(i, Port::kTransmitter, chain_.phase(i));
     }
@@ -118,7 +130,9 @@ class PtpRun {
 
   void handle(const Event& event) {
     if (event.kind == EventKind::kTruth) {
-      chain_.look(now_);
+      chain_.look(now_, [this](std::size_t i) -> const Telemetry& {
+        return ports_[i]->receiver.discipline().latest();
+      });
       return queue_.schedule(chain_.look_time(++looks_), Event{});
     }
     Ports& ports = *ports_[event.node];
@@ -128,12 +142,37 @@ class PtpRun {
       armed.reset();
     }
     if (event.kind == EventKind::kMessage) ++counters_.messages;
-    act(event, event.port == Port::kReceiver ? input(ports.receiver, event)
-                                             : input(ports.transmitter, event));
+    if (event.port == Port::kReceiver) {
+      turn(ports.receiver, event);
+    } else {
+      for (const ptp::Action& action : input(ports.transmitter, event)) act(event, action);
+    }
     arm(event);
   }
 
-  [[nodiscard]] ptp::ActionList input(ptp::TimeReceiver& receiver, const Event& event) {
+  /// One turn of the daemon's loop: an input, what it brings about, a look at the silence.
+  void turn(node::ReceiverNode& receiver, const Event& event) {
+    chain_.node(event.node).set_time(now_);
+    input(receiver, event);
+    take_all(receiver, event);
+    receiver.on_silence(port_now(event));
+    take_all(receiver, event);
+  }
+
+  void take_all(node::ReceiverNode& receiver, const Event& event) {
+    for (;;) {
+      const double error_ns = chain_.time_error_ns(event.node, now_);  // before it is steered
+      const auto told = receiver.next();
+      if (!told) return;
+      if (const auto* action = std::get_if<ptp::Action>(&*told)) act(event, *action);
+      if (const auto* steered = std::get_if<node::Steered>(&*told)) {
+        ++counters_.pairs;
+        chain_.show(event.node, now_, error_ns, steered->telemetry, steered->paces);
+      }
+    }
+  }
+
+  void input(node::ReceiverNode& receiver, const Event& event) {
     const FreeRunningTime now = port_now(event);
     const std::span<const std::uint8_t> bytes = event.bytes.view();
     switch (event.kind) {
@@ -148,9 +187,8 @@ class PtpRun {
         if (event.channel == ptp::Channel::kGeneral) return receiver.on_general_message(bytes, now);
         return receiver.on_event_message(bytes, chain_.node(event.node).stamp(now_), now);
       case EventKind::kTruth:
-        break;
+        return;
     }
-    return {};
   }
 
   [[nodiscard]] ptp::ActionList input(ptp::TimeTransmitter& transmitter, const Event& event) {
@@ -174,14 +212,8 @@ class PtpRun {
     return {};
   }
 
-  void act(const Event& cause, const ptp::ActionList& actions) {
-    for (const ptp::Action& action : actions) {
-      if (const auto* send = std::get_if<ptp::SendMessage>(&action)) transmit(cause, *send);
-      if (const auto* emit = std::get_if<ptp::EmitPair>(&action)) take(cause.node, emit->pair);
-      if (std::holds_alternative<ptp::ReferenceJumped>(action)) {
-        chain_.node(cause.node).discipline.on_new_reference();
-      }
-    }
+  void act(const Event& cause, const ptp::Action& action) {
+    if (const auto* send = std::get_if<ptp::SendMessage>(&action)) transmit(cause, *send);
   }
 
   void transmit(const Event& from, const ptp::SendMessage& message) {
@@ -201,16 +233,6 @@ class PtpRun {
     event.port = from.port;
     event.sent = now_;
     queue_.schedule(now_ + kStampLatency, event);
-  }
-
-  void take(std::size_t index, const EventPair& pair) {
-    ++counters_.pairs;
-    const Telemetry telemetry = chain_.feed(index, now_, pair);
-    Event event;
-    event.node = index;
-    ptp::TimeReceiver& receiver = ports_[index]->receiver;
-    const FreeRunningTime now = port_now(event);
-    act(event, telemetry.locked ? receiver.on_servo_locked(now) : receiver.on_servo_unlocked(now));
   }
 
   /// A timer for the port's deadline, unless an earlier one is set.

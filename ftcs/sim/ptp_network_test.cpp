@@ -18,9 +18,13 @@ class Tail final : public TwoWayObserver {
     squares_ += sample.time_error_ns * sample.time_error_ns;
     ++count_;
   }
-  void on_pair(const PairSample&) override { ++pairs; }
+  void on_pair(const PairSample& sample) override {
+    ++pairs;
+    if (!sample.paces) ++beside;
+  }
   [[nodiscard]] double rms() const { return std::sqrt(squares_ / count_); }
   int pairs = 0;
+  int beside = 0;
 
  private:
   std::size_t node_;
@@ -70,6 +74,37 @@ TEST(PtpNetwork, time_travels_down_a_chain_of_boundary_clocks) {
   Tail tail(4, 600.0);
   run_ptp_network(world(ServoKind::kKalman, 5, 20.0), 1, tail);
   EXPECT_LT(tail.rms(), 100.0);
+}
+
+TEST(PtpNetwork, peer_to_peer_without_noise_ends_up_on_the_grandmasters_time) {
+  TwoWaySpec spec = world(ServoKind::kFtcs, 1, 0.0);
+  spec.peer_to_peer = true;
+  Tail tail(0, 400.0);
+  run_ptp_network(spec, 1, tail);
+  EXPECT_LT(tail.rms(), 1.0);
+  EXPECT_EQ(tail.beside, 0) << "ftcs takes the link's delay and hears nothing else";
+}
+
+// Two stamps more an interval than end to end, and as many messages.
+TEST(PtpNetwork, the_neighbours_stamps_are_time_for_the_adaptive_servo) {
+  TwoWaySpec spec = world(ServoKind::kAdaptive, 1, 100.0);
+  Tail end_to_end(0, 400.0);
+  run_ptp_network(spec, 1, end_to_end);
+  spec.peer_to_peer = true;
+  Tail peer_to_peer(0, 400.0);
+  run_ptp_network(spec, 1, peer_to_peer);
+  EXPECT_GT(peer_to_peer.beside, 2 * 780);
+  EXPECT_LT(peer_to_peer.rms(), 1.5 * end_to_end.rms());
+}
+
+TEST(PtpNetwork, a_link_that_changes_peer_to_peer_does_not_pull_the_clock_away) {
+  TwoWaySpec spec = world(ServoKind::kAdaptive, 1, 100.0);
+  spec.peer_to_peer = true;
+  spec.nodes[0].forward.delay_steps = {{Nanoseconds{60'000'000'000}, Nanoseconds{3'000}}};
+  spec.nodes[0].backward.delay_steps = spec.nodes[0].forward.delay_steps;
+  Tail tail(0, 600.0);
+  run_ptp_network(spec, 1, tail);
+  EXPECT_LT(tail.rms(), 50.0);
 }
 
 TEST(PtpNetwork, lost_and_doubled_messages_are_survived) {

@@ -2,6 +2,7 @@
 #include "ftcs/sim/two_way.h"
 
 #include <cmath>
+#include <deque>
 
 #include "ftcs/sim/chain.h"
 #include "ftcs/sim/event_queue.h"
@@ -31,6 +32,7 @@ class TwoWayRun {
       : spec_(spec), chain_(spec, seed, observer) {
     for (std::size_t i = 0; i < chain_.size(); ++i) {
       timing_.emplace_back(seed, "timing", i);
+      disciplines_.emplace_back(spec.nodes[i].discipline, chain_.node(i).clock);
       queue_.schedule(chain_.phase(i), {EventKind::kCycle, i, {}});
     }
     queue_.schedule(chain_.start(), {EventKind::kTruth, 0, {}});
@@ -52,7 +54,7 @@ class TwoWayRun {
         return begin_cycle(event.node);
       case EventKind::kSyncArrives:
         pair.free_running = chain_.node(event.node).stamp(now_);
-        chain_.feed(event.node, now_, pair);
+        feed(event.node, pair);
         return;
       case EventKind::kRequestLeaves:
         return send_request(event.node);
@@ -61,12 +63,19 @@ class TwoWayRun {
         return queue_.schedule(now_ + spec_.response_delay,
                                {EventKind::kPairKnown, event.node, pair});
       case EventKind::kPairKnown:
-        chain_.feed(event.node, now_, pair);
+        feed(event.node, pair);
         return;
       case EventKind::kTruth:
-        chain_.look(now_);
+        chain_.look(now_,
+                    [this](std::size_t i) -> const Telemetry& { return disciplines_[i].latest(); });
         return queue_.schedule(chain_.look_time(++looks_), {EventKind::kTruth, 0, {}});
     }
+  }
+
+  void feed(std::size_t index, const EventPair& pair) {
+    const double error_ns = chain_.time_error_ns(index, now_);
+    chain_.node(index).set_time(now_);
+    chain_.show(index, now_, error_ns, disciplines_[index].on_pair(pair));
   }
 
   /// The nominal interval, or one of a log-uniform spread around it.
@@ -105,6 +114,7 @@ class TwoWayRun {
 
   const TwoWaySpec& spec_;
   Chain chain_;
+  std::deque<ClockDiscipline> disciplines_;  ///< not copied, never moved
   std::vector<RandomStream> timing_;
   EventQueue<Event> queue_;
   TrueTime now_{};

@@ -44,6 +44,7 @@ struct TwoWaySpec {
   Duration reference_tick{};  ///< granularity of the reference's timestamps
   bool random_phase = true;   ///< t0 uniform in one interval; false: t0 = 0
   bool two_way = true;        ///< false: no delay requests
+  bool peer_to_peer = false;  ///< run_ptp_network: Pdelay exchanges with the neighbour instead
   std::uint64_t cycles = 0;
   int truth_per_cycle = 8;  ///< how often the truth is looked at
   std::vector<ReferenceStep> reference_steps;
@@ -69,6 +70,7 @@ struct PairSample {
   double time_error_ns =
       0.0;  ///< true, when the message was handled, before the command took effect
   const Telemetry* telemetry = nullptr;
+  bool paces = true;  ///< false: heard beside the Syncs, no sample of its own
 };
 
 class TwoWayObserver {
