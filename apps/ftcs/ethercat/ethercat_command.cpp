@@ -111,7 +111,11 @@ int end_with(const std::string& message, int exit_code) {
 }
 
 int end_with(const ethercat::Failure& failure, const daemon::RunOptions& options) {
-  if (!failure) return end_with("stopped by a signal before the first cycle", kNotLocked);
+  if (!failure)
+    return end_with(
+        "stopped by a signal before the first cycle; the SubDevices stay in the state they had "
+        "reached",
+        kNotLocked);
   if (failure.kind != ethercat::FailureKind::kNoReply) {
     return end_with(daemon::describe(failure), kRuntimeError);
   }
@@ -194,6 +198,8 @@ void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
   command.add_option("--udp", arguments.udp, "HOST[:PORT] of a segment; default 127.0.0.1:34980")
       ->excludes(interface);
   command.add_option("--drives", arguments.options.drives, "fewer than these are an error");
+  command.add_flag("--take-over", arguments.options.take_over,
+                   "reset SubDevices even if another MainDevice has them in OP");
 }
 
 void add_run_flags(CLI::App& command, EthercatArguments& arguments) {

@@ -31,6 +31,7 @@ node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
     return static_cast<std::uint64_t>(seconds / cycle_s);
   };
   config.main.expected_subdevices = options.drives;
+  config.main.take_over = options.take_over;
   config.main.retries = kRetries;
   config.main.lost_frame_limit = options.lost_frame_limit;
   config.main.scan_only = scan_only;

@@ -19,6 +19,7 @@ struct RunOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = ethercat::kUdpPort;
   std::size_t drives = 0;  ///< expected at least
+  bool take_over = false;  ///< also SubDevices that are in OP
   std::string servo_name = "ftcs";
   CycleServoConfig servo;
   double sync0_phase = 0.5;  ///< SYNC0 comes this part of a cycle after the frame

@@ -161,6 +161,7 @@ std::string describe(const ethercat::Failure& failure) {
     case FailureKind::kFewerThanConfigured:
     case FailureKind::kWorkingCounter:
     case FailureKind::kProcessImageTooLarge:
+    case FailureKind::kNotStopped:
       return fmt::format("{} (expected {}, found {})", text, failure.expected, failure.received);
     case FailureKind::kStateRefused:
     case FailureKind::kStateTimeout:
@@ -175,6 +176,14 @@ std::string describe(const ethercat::Failure& failure) {
     case FailureKind::kReplaced:
       return fmt::format("{} (expected {}; found {})", text, describe(failure.known),
                          describe(failure.found));
+    case FailureKind::kMailboxUnusable:
+      return failure.received < failure.expected
+                 ? fmt::format("{} ({} octets, an SDO needs {})", text, failure.received,
+                               failure.expected)
+                 : fmt::format("{} ({} octets, a frame holds {})", text, failure.received,
+                               failure.expected);
+    case FailureKind::kInOperation:
+      return text + " (stop it, or take them over with --take-over)";
     case FailureKind::kBadSii:
       return fmt::format("{} ({})", text, ethercat::name(failure.sii));
     case FailureKind::kLinkLost:

@@ -95,6 +95,74 @@ TEST_F(BadInput, an_sii_interface_that_stays_busy) {
   EXPECT_EQ(bring_up().kind, FailureKind::kSiiTimeout);
 }
 
+/// Word 0x18 on: start and size of the mailboxes, read eight bytes at a time.
+TEST_F(BadInput, a_mailbox_that_no_frame_holds_or_that_holds_no_sdo_is_refused_at_the_scan) {
+  for (const std::uint16_t size : {std::uint16_t{1467}, std::uint16_t{0xFFFF}, std::uint16_t{15}}) {
+    test::MainBench bench;
+    bench.add_line(3, Nanoseconds{50});
+    bench.tamper = [size](const FrameView& frame) {
+      for (const Datagram datagram : frame) {
+        const Bytes data = datagram.data();
+        if (datagram.offset() != reg::kSiiControl || data.size() < 14) continue;
+        if (load<std::uint32_t>(data, 2) == sii::kMailboxWord) store(data, 8, size);
+      }
+    };
+    bench.bring_up();
+    EXPECT_EQ(bench.main().stage(), Stage::kStopped);
+    EXPECT_EQ(bench.main().failure().kind, FailureKind::kMailboxUnusable);
+    EXPECT_EQ(bench.main().failure().position, 0);
+    EXPECT_EQ(bench.main().failure().received, size);
+    EXPECT_EQ(bench.main().failure().expected, size < 1000 ? 16 : 1466);
+  }
+}
+
+TEST_F(BadInput, a_mailbox_full_of_something_else_does_not_prolong_the_deadline_of_an_sdo) {
+  // Each read of a mailbox brings an emergency (CoE service 1), for ever.
+  static constexpr SdoDownload kObject[] = {{{0x6060, 0}, 1, 8}};
+  MainDeviceConfig config;
+  config.clocks.drift_pulses = 10;
+  config.process.objects = kObject;
+  bench_.configure(config);
+  bench_.tamper = [this](const FrameView& frame) {
+    const Datagram datagram = frame[0];
+    if (datagram.command() != Command::kFprd || datagram.data().size() < 64) return;
+    store(datagram.data(), 0, std::uint16_t{10});
+    datagram.data()[5] = kMailboxTypeCoe;
+    store(datagram.data(), 6, std::uint16_t{1U << 12});
+    set_counter(datagram, 1);
+  };
+  const WireTime before = bench_.now();
+  const Failure& failure = bring_up();
+  EXPECT_EQ(failure.kind, FailureKind::kSdoTimeout) << name(failure.kind);
+  EXPECT_EQ(failure.object.index, 0x6060);
+  EXPECT_LT((bench_.now() - before).seconds(), 1.5);
+}
+
+TEST_F(BadInput, a_bring_up_that_takes_too_long_as_a_whole_is_given_up) {
+  MainDeviceConfig config;
+  config.clocks.drift_pulses = 100'000;  // 20 us each
+  config.bring_up_timeout = Nanoseconds{1'000'000'000};
+  bench_.configure(config);
+  EXPECT_EQ(bring_up().kind, FailureKind::kBringUpTimeout);
+}
+
+TEST_F(BadInput, a_name_from_the_wire_has_no_control_characters) {
+  bench_.tamper = [](const FrameView& frame) {
+    for (const Datagram datagram : frame) {
+      const Bytes data = datagram.data();
+      if (datagram.offset() != reg::kSiiControl || data.size() < 14) continue;
+      for (std::size_t at = 6; at < data.size(); ++at) {
+        if (data[at] == 'v') data[at] = 0x1B;  // ESC, in "servo drive"
+      }
+    }
+  };
+  bring_up();
+  ASSERT_FALSE(bench_.main().failure()) << name(bench_.main().failure().kind);
+  const std::string text = bench_.main().network().devices[0].sii.device_name.data();
+  EXPECT_NE(text.find('?'), std::string::npos) << text;
+  for (const char c : text) EXPECT_TRUE(c >= 0x20 && c < 0x7F) << text;
+}
+
 TEST_F(BadInput, ports_that_do_not_form_a_tree) {
   change(reg::kDlStatus,
          [](const Datagram& datagram) { store(datagram.data(), 0, std::uint16_t{0xFFFF}); });

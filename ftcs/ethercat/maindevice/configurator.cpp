@@ -288,7 +288,9 @@ Progress Configurator::sizes(const FrameView& frame, SubDeviceInfo& device, Free
   const Progress progress = sdo_.reply(frame, device_, now, failure);
   if (progress != Progress::kDone) return progress;
   if (walk(sdo_.value())) {
-    const auto bytes = static_cast<std::uint16_t>((walk_.bits + 7) / 8);
+    // Beyond one frame place_image() refuses it, whatever it is.
+    const auto bytes =
+        static_cast<std::uint16_t>(std::min<std::size_t>((walk_.bits + 7) / 8, kMaxImageSize + 1));
     (walk_.inputs ? device.inputs : device.outputs).size = bytes;
     if (walk_.inputs) return Progress::kDone;
     walk_ = MappingWalk{};
@@ -316,7 +318,7 @@ Progress Configurator::place_image(Network& network, Failure& failure) noexcept 
   if (at <= kMaxImageSize) return Progress::kContinue;
   return fail(failure, {.kind = FailureKind::kProcessImageTooLarge,
                         .expected = kMaxImageSize,
-                        .received = static_cast<std::uint16_t>(at)});
+                        .received = static_cast<std::uint16_t>(std::min<std::size_t>(at, 0xFFFF))});
 }
 
 }  // namespace ftcs::ethercat

@@ -23,6 +23,16 @@ const char* name(FailureKind kind) noexcept {
       return "bad SII";
     case FailureKind::kSiiTimeout:
       return "SII stays busy";
+    case FailureKind::kInOperation:
+      return "SubDevices are in OP already: another MainDevice drives them";
+    case FailureKind::kMailboxUnusable:
+      return "mailbox of unusable size";
+    case FailureKind::kBringUpTimeout:
+      return "bring-up does not come to an end";
+    case FailureKind::kFrameTooLarge:
+      return "request larger than one frame";
+    case FailureKind::kNotStopped:
+      return "SubDevices did not leave OP when they were stopped";
     case FailureKind::kStateRefused:
       return "state refused";
     case FailureKind::kStateTimeout:

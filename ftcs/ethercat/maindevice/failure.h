@@ -19,7 +19,12 @@ enum class FailureKind : std::uint8_t {
   kImpossibleTopology,   ///< the ports that are open do not form a tree of what was counted
   kBadSii,               ///< sii tells what is wrong
   kSiiTimeout,
-  kStateRefused,  ///< wanted, actual and code tell which transition and why
+  kInOperation,      ///< somebody is in OP before the scan: another MainDevice drives them
+  kMailboxUnusable,  ///< size of a mailbox: too small for an SDO or too large for a frame
+  kBringUpTimeout,   ///< every answer came in time, and there was no end of them
+  kFrameTooLarge,    ///< what is to be sent does not fit into one frame
+  kNotStopped,       ///< asked for SAFEOP again and again, somebody is still in OP
+  kStateRefused,     ///< wanted, actual and code tell which transition and why
   kStateTimeout,
   kSdoAborted,  ///< object and abort
   kSdoTimeout,

@@ -27,25 +27,39 @@ const char* name(Stage stage) noexcept {
 }
 
 MainDevice::MainDevice(const MainDeviceConfig& config) noexcept : config_(config) {
-  scanner_.start(config.expected_subdevices, config.sii_timeout);
+  scanner_.start(config.expected_subdevices, config.sii_timeout, config.take_over);
 }
 
 ConstBytes MainDevice::next_frame() noexcept {
   if (outstanding_) on_timeout();
   if (stage_ == Stage::kStopped) return {};
-  FrameWriter writer(buffer_, ++index_);
+  FrameWriter writer(buffer_, 0);
   write_frame(writer);
   const auto frame = writer.finish();
-  if (!frame) return {};
-  datagrams_ = 0;
-  const auto written = FrameView::parse(Bytes{buffer_}.first(frame->size()));
-  if (!written || written->count() > kMaxDatagrams) return {};
-  for (const Datagram datagram : *written) {
-    sizes_[datagrams_++] = static_cast<std::uint16_t>(datagram.data().size());
+  if (!frame || !number_datagrams(*frame)) {
+    // In the cyclic stage the way down goes out instead, with the next call.
+    const bool running = stage_ == Stage::kCyclic;
+    begin_stop({.kind = FailureKind::kFrameTooLarge});
+    if (!running) stage_ = Stage::kStopped;
+    return {};
   }
   outstanding_ = true;
   ++counters_.sent;
   return *frame;
+}
+
+/// The index of a datagram has eight bits: an answer 256 frames old would look right. A frame has a
+/// number of 32 bits; its datagrams carry the four bytes in turn.
+bool MainDevice::number_datagrams(ConstBytes frame) noexcept {
+  size_ = frame.size();
+  const auto written = FrameView::parse(Bytes{buffer_}.first(size_));
+  if (!written) return false;
+  ++number_;
+  unsigned turn = 0;
+  for (const Datagram datagram : *written) {
+    datagram.set_index(static_cast<std::uint8_t>(number_ >> (8 * (turn++ % 4))));
+  }
+  return true;
 }
 
 void MainDevice::write_frame(FrameWriter& writer) noexcept {
@@ -68,21 +82,27 @@ void MainDevice::write_frame(FrameWriter& writer) noexcept {
     case Stage::kStopping:
       writer.add_value({Command::kBwr, 0, reg::kAlControl},
                        static_cast<std::uint16_t>(AlState::kSafeOp));
+      writer.add({Command::kBrd, 0, reg::kAlStatus}, 2);
       return;
     case Stage::kStopped:
       return;
   }
 }
 
-/// The reply has the index, and as many datagrams, of what was sent.
-bool MainDevice::answers(const FrameView& frame) const noexcept {
-  if (!outstanding_ || frame.count() != datagrams_) return false;
-  const Datagram first = frame[0];
-  const bool same_command = static_cast<std::uint8_t>(first.command()) == buffer_[kFrameHeaderSize];
-  if (first.index() != index_ || !same_command) return false;
-  std::size_t n = 0;
+/// The reply is the request: number, commands, addresses and sizes of all its datagrams. Positions
+/// are counted up on the way.
+bool MainDevice::answers(const FrameView& frame) noexcept {
+  if (!outstanding_) return false;
+  const auto sent = FrameView::parse(Bytes{buffer_}.first(size_));
+  if (!sent || frame.count() != sent->count()) return false;
+  auto mine = sent->begin();
   for (const Datagram datagram : frame) {
-    if (datagram.data().size() != sizes_[n++]) return false;
+    const Datagram request = *mine;
+    ++mine;
+    const bool same =
+        datagram.index() == request.index() && datagram.command() == request.command() &&
+        datagram.offset() == request.offset() && datagram.data().size() == request.data().size();
+    if (!same) return false;
   }
   return true;
 }
@@ -98,23 +118,55 @@ FrameOutcome MainDevice::on_frame(Bytes bytes, const FrameStamps& stamps) noexce
   counters_.lost_in_a_row = 0;
   switch (stage_) {
     case Stage::kScan:
-      return advance(scanner_.reply(*frame, network_, stamps.received, failure_));
     case Stage::kClocks:
-      return advance(clock_setup_.reply(*frame, network_, stamps.sent, failure_));
     case Stage::kConfigure:
-      return advance(configurator_.reply(*frame, network_, stamps.received, failure_));
+      return bring_up(*frame, stamps);
     case Stage::kCyclic:
       cycle_ = exchange_.reply(*frame, network_);
       if (reintegrator_asked_) reintegrate(frame->from(exchange_.datagrams()), stamps.received);
       keep_members();
       return finish_cycle();
     case Stage::kStopping:
-      if (--stop_frames_ > 0) return FrameOutcome::kProgress;
-      stage_ = Stage::kStopped;
-      break;
+      return confirm_stop(*frame, stamps.received);
     case Stage::kStopped:
       break;
   }
+  return FrameOutcome::kStopped;
+}
+
+FrameOutcome MainDevice::bring_up(const FrameView& frame, const FrameStamps& stamps) noexcept {
+  if (!has_begun_) begun_ = stamps.received;
+  has_begun_ = true;
+  if (stamps.received - begun_ > Duration{config_.bring_up_timeout}) {
+    return advance(fail(failure_, {.kind = FailureKind::kBringUpTimeout}));
+  }
+  if (stage_ == Stage::kScan) {
+    return advance(scanner_.reply(frame, network_, stamps.received, failure_));
+  }
+  if (stage_ == Stage::kClocks) {
+    return advance(clock_setup_.reply(frame, network_, stamps.sent, failure_));
+  }
+  return advance(configurator_.reply(frame, network_, stamps.received, failure_));
+}
+
+/// Asked for again until everybody has been seen out of OP. Who does not answer has been given up.
+FrameOutcome MainDevice::confirm_stop(const FrameView& frame, FreeRunningTime now) noexcept {
+  if (!has_begun_) begun_ = now;
+  has_begun_ = true;
+  const Datagram status = frame[1];
+  const auto states = load<std::uint16_t>(status.data(), 0);
+  const bool out_of_op = (states & static_cast<std::uint16_t>(AlState::kOp)) == 0;
+  const bool all_there = status.working_counter() == network_.count;
+  if (stop_frames_ > 0) --stop_frames_;
+  stop_confirmed_ = out_of_op && (all_there || stop_frames_ == 0);
+  const bool too_long = now - begun_ > Duration{config_.stop_timeout};
+  if (!stop_confirmed_ && !too_long) return FrameOutcome::kProgress;
+  if (!stop_confirmed_ && !failure_) {
+    failure_ = {.kind = FailureKind::kNotStopped,
+                .expected = static_cast<std::uint16_t>(network_.count),
+                .received = status.working_counter()};
+  }
+  stage_ = Stage::kStopped;
   return FrameOutcome::kStopped;
 }
 
@@ -134,6 +186,7 @@ FrameOutcome MainDevice::advance(Progress progress) noexcept {
   }
   if (stage_ == Stage::kConfigure) {
     exchange_.start(network_);
+    has_begun_ = false;
     stage_ = Stage::kCyclic;
     return FrameOutcome::kProgress;
   }
@@ -239,7 +292,7 @@ FrameOutcome MainDevice::on_timeout() noexcept {
     }
     return FrameOutcome::kCycle;
   }
-  if (stage_ == Stage::kStopping && --stop_frames_ == 0) {
+  if (stage_ == Stage::kStopping && (stop_frames_ == 0 || --stop_frames_ == 0)) {
     stage_ = Stage::kStopped;
     return FrameOutcome::kStopped;
   }

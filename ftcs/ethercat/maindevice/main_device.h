@@ -31,6 +31,13 @@ struct MainDeviceConfig {
   /// run; so often in a row at most.
   std::uint32_t reintegration_attempts = 3;
   Nanoseconds sii_timeout{1'000'000'000};
+  /// For the whole of the bring-up: SubDevices that always have an answer and never the right one
+  /// could keep it busy for ever.
+  Nanoseconds bring_up_timeout{60'000'000'000};
+  /// Reset SubDevices that are in OP, which another MainDevice drives.
+  bool take_over = false;
+  /// So long the way down is repeated until nobody is in OP any more.
+  Nanoseconds stop_timeout{200'000'000};
 };
 
 enum class Stage : std::uint8_t {
@@ -98,6 +105,8 @@ class MainDevice {
   [[nodiscard]] std::size_t reintegrating() const noexcept {
     return reintegrator_.active() ? reintegrator_.position() : network_.count;
   }
+  /// After the way down: everybody who answers was seen out of OP.
+  [[nodiscard]] bool stop_confirmed() const noexcept { return stop_confirmed_; }
   /// In the cyclic stage: all that were configured exchange process data.
   [[nodiscard]] bool complete() const noexcept;
   [[nodiscard]] bool takes_part(std::size_t position) const noexcept {
@@ -119,7 +128,10 @@ class MainDevice {
 
  private:
   void write_frame(FrameWriter& writer) noexcept;
-  [[nodiscard]] bool answers(const FrameView& frame) const noexcept;
+  [[nodiscard]] bool number_datagrams(ConstBytes frame) noexcept;
+  [[nodiscard]] bool answers(const FrameView& frame) noexcept;
+  FrameOutcome bring_up(const FrameView& frame, const FrameStamps& stamps) noexcept;
+  FrameOutcome confirm_stop(const FrameView& frame, FreeRunningTime now) noexcept;
   FrameOutcome advance(Progress progress) noexcept;
   void write_reintegration(FrameWriter& writer) noexcept;
   void reintegrate(const FrameView& frame, FreeRunningTime now) noexcept;
@@ -147,14 +159,14 @@ class MainDevice {
   CycleCounters counters_;
 
   std::array<std::uint8_t, kMaxFrameSize> buffer_{};
-  /// 1500 bytes hold no more of the smallest useful datagrams.
-  static constexpr std::size_t kMaxDatagrams = 115;
-  std::array<std::uint16_t, kMaxDatagrams> sizes_{};  ///< of the frame that is out
-  std::size_t datagrams_ = 0;
-  std::uint8_t index_ = 0;
+  std::size_t size_ = 0;  ///< of the frame that is out
+  std::uint32_t number_ = 0;
   bool outstanding_ = false;
+  FreeRunningTime begun_;  ///< first answer of the bring-up, of the way down
+  bool has_begun_ = false;
   std::uint32_t retries_ = 0;
   std::uint32_t stop_frames_ = 0;
+  bool stop_confirmed_ = false;
 };
 
 }  // namespace ftcs::ethercat

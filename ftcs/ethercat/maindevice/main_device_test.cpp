@@ -260,6 +260,72 @@ TEST(MainDevice, ignores_foreign_malformed_and_late_frames) {
   EXPECT_EQ(bench.main().on_frame(late, {}), FrameOutcome::kIgnored) << "of the frame before";
 }
 
+TEST(MainDevice, an_answer_256_frames_old_is_not_taken_for_the_one_that_is_waited_for) {
+  MainBench bench(csp_config());
+  add_drives(bench, 2);
+  bench.bring_up();
+  std::vector<std::uint8_t> old;
+  bench.capture = [&old](FreeRunningTime, ConstBytes frame) {
+    old.assign(frame.begin(), frame.end());  // the last one of a cycle is the answer
+  };
+  bench.run(1);
+  bench.capture = nullptr;
+  bench.run(255);
+  constexpr std::size_t kFirstIndex = kFrameHeaderSize + 1;
+  ASSERT_EQ(bench.main().next_frame()[kFirstIndex], old[kFirstIndex]) << "it has come round";
+  EXPECT_EQ(bench.main().on_frame(old, {}), FrameOutcome::kIgnored);
+}
+
+TEST(MainDevice, drives_in_op_are_left_to_the_one_who_drives_them_unless_told_otherwise) {
+  MainBench bench(csp_config());
+  add_drives(bench, 3);
+  to_op(bench);
+  for (const bool take_over : {false, true}) {
+    MainDeviceConfig config = csp_config();
+    config.take_over = take_over;
+    bench.configure(config);  // a second MainDevice on the same wire
+    bench.bring_up();
+    EXPECT_EQ(bench.main().cyclic(), take_over);
+    const FailureKind wanted = take_over ? FailureKind::kNone : FailureKind::kInOperation;
+    EXPECT_EQ(bench.main().failure().kind, wanted);
+    if (take_over) continue;
+    for (std::size_t n = 0; n < 3; ++n) {
+      EXPECT_EQ(bench.segment()[n].drive().state(), AlState::kOp);
+    }
+  }
+}
+
+TEST(MainDevice, a_stop_is_over_when_everybody_was_seen_out_of_op) {
+  MainBench bench(csp_config());
+  add_drives(bench, 3);
+  to_op(bench);
+  bench.main().stop();
+  bench.run(2);
+  EXPECT_EQ(bench.main().stage(), Stage::kStopped);
+  EXPECT_TRUE(bench.main().stop_confirmed());
+  EXPECT_EQ(bench.main().failure().kind, FailureKind::kNone);
+}
+
+TEST(MainDevice, drives_that_do_not_obey_the_stop_are_a_failure_after_its_time) {
+  MainBench bench(csp_config());
+  add_drives(bench, 3);
+  to_op(bench);
+  bench.tamper = [](const FrameView& frame) {
+    for (const Datagram datagram : frame) {
+      const bool states =
+          datagram.command() == Command::kBrd && datagram.offset() == reg::kAlStatus;
+      if (states) store(datagram.data(), 0, std::uint16_t{0x0C});  // one is still in OP
+    }
+  };
+  bench.main().stop();
+  bench.run(190);
+  EXPECT_EQ(bench.main().stage(), Stage::kStopping) << "asked again and again";
+  bench.run(30);
+  EXPECT_EQ(bench.main().stage(), Stage::kStopped);
+  EXPECT_FALSE(bench.main().stop_confirmed());
+  EXPECT_EQ(bench.main().failure().kind, FailureKind::kNotStopped);
+}
+
 TEST(MainDevice, without_distributed_clocks_drives_run_free) {
   MainDeviceConfig config = csp_config();
   config.distributed_clocks = false;

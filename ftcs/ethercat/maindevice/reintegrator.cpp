@@ -161,52 +161,47 @@ void Reintegrator::begin_configuration() noexcept {
 
 Progress Reintegrator::reply(const FrameView& frame, Network& network, ReferenceTime reference,
                              FreeRunningTime now, Failure& failure) noexcept {
-  SubDeviceInfo& device = network.devices[position_];
   if (step_ == Step::kConfigure) {
     const Progress progress = configurator_.reply(frame, network, now, failure);
     if (progress != Progress::kContinue) active_ = false;
     return progress;
   }
-  const Datagram first = frame[0];
-  if (first.working_counter() != 1) {
-    if (!expired(now, config_.state_timeout)) return Progress::kContinue;
-    active_ = false;
-    return fail(failure, {.kind = FailureKind::kNotAnswering,
-                          .position = static_cast<std::uint16_t>(position_)});
-  }
   Progress progress = Progress::kContinue;
+  if (frame[0].working_counter() == 1) {
+    progress = take(frame, network, reference, now, failure);
+  } else if (expired(now, config_.state_timeout)) {
+    progress = fail(failure, {.kind = FailureKind::kNotAnswering,
+                              .position = static_cast<std::uint16_t>(position_)});
+  }
+  if (progress == Progress::kFailed) active_ = false;
+  return progress;
+}
+
+/// One step, whose first datagram was answered.
+Progress Reintegrator::take(const FrameView& frame, Network& network, ReferenceTime reference,
+                            FreeRunningTime now, Failure& failure) noexcept {
+  SubDeviceInfo& device = network.devices[position_];
   switch (step_) {
+    case Step::kAwaitInit:
+      return await_init(frame[0], device, now, failure);
+    case Step::kIdentity:
+      return identify(frame, network, now, failure);
+    case Step::kSettle:
+      return settle(frame[0], now, failure);
     case Step::kAddress:
       enter(Step::kReset);
       break;
     case Step::kReset:
       enter(Step::kAwaitInit);
       break;
-    case Step::kAwaitInit:
-      progress = await_init(first, device, now, failure);
-      break;
-    case Step::kIdentity:
-      progress = identify(frame, network, now, failure);
-      break;
     case Step::kPrepareClock:
       enter(Step::kLatch);
       break;
-    case Step::kLatch: {
-      const bool whole = frame[1].working_counter() == 1;
-      const bool wide = network.devices[time_source(network)].dc64();
-      if (!whole) break;
-      // Of a 32-bit clock the upper half comes from the cycle's unwrapped time.
-      latched_ = wide ? ReferenceTime::from_ns(
-                            static_cast<std::int64_t>(load<std::uint64_t>(frame[1].data(), 0)))
-                      : reference;
-      if (wide || reference.since_epoch() != Duration{}) enter(Step::kReadLatch);
+    case Step::kLatch:
+      take_latch(frame, network, reference);
       break;
-    }
     case Step::kReadLatch:
-      device.receive_time = load<std::uint64_t>(first.data(), 0);
-      device.system_time_offset = static_cast<std::uint64_t>(latched_.since_epoch().rounded_ns()) +
-                                  device.propagation_delay - device.receive_time;
-      enter(Step::kWriteClock);
+      take_local_time(frame[0], device);
       break;
     case Step::kWriteClock:
       // The reference is what the others are compared with: it has nothing to settle on.
@@ -216,14 +211,28 @@ Progress Reintegrator::reply(const FrameView& frame, Network& network, Reference
         enter(Step::kSettle);
       }
       break;
-    case Step::kSettle:
-      progress = settle(first, now, failure);
-      break;
     case Step::kConfigure:
       break;
   }
-  if (progress == Progress::kFailed) active_ = false;
-  return progress;
+  return Progress::kContinue;
+}
+
+/// The frame latched the local time and read the reference's. Of a 32-bit clock the upper half
+/// comes from the cycle's unwrapped time.
+void Reintegrator::take_latch(const FrameView& frame, const Network& network,
+                              ReferenceTime reference) noexcept {
+  if (frame[1].working_counter() != 1) return;
+  const bool wide = network.devices[time_source(network)].dc64();
+  const auto read = static_cast<std::int64_t>(load<std::uint64_t>(frame[1].data(), 0));
+  latched_ = wide ? ReferenceTime::from_ns(read) : reference;
+  if (wide || reference.since_epoch() != Duration{}) enter(Step::kReadLatch);
+}
+
+void Reintegrator::take_local_time(const Datagram& datagram, SubDeviceInfo& device) noexcept {
+  device.receive_time = load<std::uint64_t>(datagram.data(), 0);
+  device.system_time_offset = static_cast<std::uint64_t>(latched_.since_epoch().rounded_ns()) +
+                              device.propagation_delay - device.receive_time;
+  enter(Step::kWriteClock);
 }
 
 }  // namespace ftcs::ethercat

@@ -51,6 +51,10 @@ class Reintegrator {
     kSettle,
     kConfigure,
   };
+  [[nodiscard]] Progress take(const FrameView& frame, Network& network, ReferenceTime reference,
+                              FreeRunningTime now, Failure& failure) noexcept;
+  void take_latch(const FrameView& frame, const Network& network, ReferenceTime reference) noexcept;
+  void take_local_time(const Datagram& datagram, SubDeviceInfo& device) noexcept;
   [[nodiscard]] Progress await_init(const Datagram& datagram, SubDeviceInfo& device,
                                     FreeRunningTime now, Failure& failure) noexcept;
   [[nodiscard]] Progress identify(const FrameView& frame, const Network& network,

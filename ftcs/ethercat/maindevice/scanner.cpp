@@ -11,7 +11,8 @@ constexpr std::size_t kIdentitySize = 10;
 constexpr std::size_t kAlStatusSize = 6;
 }  // namespace
 
-void Scanner::start(std::size_t expected, Nanoseconds timeout) noexcept {
+void Scanner::start(std::size_t expected, Nanoseconds timeout, bool take_over) noexcept {
+  take_over_ = take_over;
   step_ = Step::kCount;
   expected_ = expected;
   timeout_ = timeout;
@@ -42,6 +43,7 @@ void Scanner::request(FrameWriter& writer, const Network& network) noexcept {
   switch (step_) {
     case Step::kCount:
       writer.add({kBrd, 0, reg::kType}, 2);
+      writer.add({kBrd, 0, reg::kAlStatus}, 2);
       break;
     case Step::kReset:
       write_reset(writer);
@@ -95,6 +97,11 @@ Progress Scanner::count(const FrameView& frame, Network& network, Failure& failu
     return fail(
         failure,
         {.kind = FailureKind::kFewerThanConfigured, .expected = expected, .received = found});
+  }
+  // Nobody stays in OP by itself: outputs come from somewhere, and a reset would stop a machine.
+  const auto states = load<std::uint16_t>(frame[1].data(), 0);
+  if (!take_over_ && (states & static_cast<std::uint16_t>(AlState::kOp)) != 0) {
+    return fail(failure, {.kind = FailureKind::kInOperation});
   }
   network.count = found;
   for (std::size_t n = 0; n < found; ++n) {
@@ -181,10 +188,28 @@ Progress Scanner::next_sii_word(Network& network, Failure& failure) noexcept {
                   {.kind = FailureKind::kBadSii, .position = position(), .sii = content.error()});
     }
     device.sii = *content;
+    if (check_mailboxes(device, failure) == Progress::kFailed) return Progress::kFailed;
   }
   image_used_ = 0;
   if (++device_ < network.count) return Progress::kContinue;
   return finish(network, failure);
+}
+
+/// An SDO must fit into each mailbox, and each mailbox into a frame beside the drift datagram.
+Progress Scanner::check_mailboxes(const SubDeviceInfo& device, Failure& failure) const noexcept {
+  constexpr std::size_t kDriftDatagram = kDatagramOverhead + 8;
+  constexpr std::size_t kLargest =
+      kMaxFrameSize - kFrameHeaderSize - kDatagramOverhead - kDriftDatagram;
+  if (!device.sii.coe()) return Progress::kContinue;
+  for (const MailboxWindow& mailbox : {device.sii.receive, device.sii.send}) {
+    if (mailbox.size >= kSdoOverhead && mailbox.size <= kLargest) continue;
+    const std::size_t bound = mailbox.size < kSdoOverhead ? kSdoOverhead : kLargest;
+    return fail(failure, {.kind = FailureKind::kMailboxUnusable,
+                          .position = position(),
+                          .expected = static_cast<std::uint16_t>(bound),
+                          .received = mailbox.size});
+  }
+  return Progress::kContinue;
 }
 
 /// Vendor, product and revision of a SubDevice read before: only alias and serial number differ.

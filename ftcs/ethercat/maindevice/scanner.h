@@ -15,7 +15,8 @@ namespace ftcs::ethercat {
 class Scanner {
  public:
   /// `expected`: how many there must be at least; zero: any number.
-  void start(std::size_t expected, Nanoseconds timeout) noexcept;
+  /// `take_over`: also from SubDevices that are in OP.
+  void start(std::size_t expected, Nanoseconds timeout, bool take_over) noexcept;
   void request(FrameWriter& writer, const Network& network) noexcept;
   [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime now,
                                Failure& failure) noexcept;
@@ -30,6 +31,8 @@ class Scanner {
   [[nodiscard]] Progress read_sii(const FrameView& frame, Network& network, FreeRunningTime now,
                                   Failure& failure) noexcept;
   [[nodiscard]] Progress next_sii_word(Network& network, Failure& failure) noexcept;
+  [[nodiscard]] Progress check_mailboxes(const SubDeviceInfo& device,
+                                         Failure& failure) const noexcept;
   [[nodiscard]] bool take_from_twin(Network& network) const noexcept;
   [[nodiscard]] bool end_seen() noexcept;
   [[nodiscard]] Progress finish(Network& network, Failure& failure) noexcept;
@@ -42,6 +45,7 @@ class Scanner {
   static constexpr std::size_t kImageSize = 4096;
   Step step_ = Step::kCount;
   std::size_t expected_ = 0;
+  bool take_over_ = false;
   Nanoseconds timeout_{};
   std::size_t device_ = 0;
   FreeRunningTime deadline_;

@@ -34,7 +34,7 @@ void SdoClient::request(FrameWriter& writer, const SubDeviceInfo& device) noexce
       writer.add(device.target(Command::kFpwr, device.sii.receive.start), device.sii.receive.size);
   const Sdo sdo{kind_, object_.object,  counter_,
                 false, SdoAbort::kNone, ConstBytes{bytes}.first(object_.size)};
-  // Cannot fail: check_mailboxes() saw that a whole SDO fits.
+  // Cannot fail: Scanner::check_mailboxes() saw that a whole SDO fits.
   if (!mailbox.empty()) static_cast<void>(encode_sdo(mailbox, sdo));
 }
 
@@ -43,11 +43,15 @@ Progress SdoClient::reply(const FrameView& frame, std::size_t position, FreeRunn
   if (!deadline_set_) deadline_ = now + timeout_;
   deadline_set_ = true;
   const auto where = static_cast<std::uint16_t>(position);
-  const bool taken = frame[0].working_counter() == 1;
-  if (!taken && now >= deadline_) {
-    return fail(failure,
-                {.kind = FailureKind::kSdoTimeout, .position = where, .object = object_.object});
-  }
+  const Progress progress = take(frame[0], where, now, failure);
+  if (progress != Progress::kContinue || now < deadline_) return progress;
+  return fail(failure,
+              {.kind = FailureKind::kSdoTimeout, .position = where, .object = object_.object});
+}
+
+Progress SdoClient::take(const Datagram& answer, std::uint16_t position, FreeRunningTime now,
+                         Failure& failure) noexcept {
+  const bool taken = answer.working_counter() == 1;
   if (step_ == Step::kSend) {
     // Not taken: the mailbox is still full of the last request; its answer must be fetched first.
     step_ = Step::kReceive;
@@ -58,21 +62,21 @@ Progress SdoClient::reply(const FrameView& frame, std::size_t position, FreeRunn
     if (now >= deadline_ - timeout_ * 3 / 4) step_ = Step::kSend;
     return Progress::kContinue;
   }
-  const auto sdo = decode_sdo(frame[0].data());
+  const auto sdo = decode_sdo(answer.data());
   if (!sdo) {
     // Emergencies and other protocols share the mailbox.
     if (sdo.error() == MailboxError::kNotSdo || sdo.error() == MailboxError::kNotCoe) {
       return Progress::kContinue;
     }
     return fail(failure, {.kind = FailureKind::kSdoMalformed,
-                          .position = where,
+                          .position = position,
                           .object = object_.object,
                           .mailbox = sdo.error()});
   }
   if (sdo->object != object_.object) return Progress::kContinue;  // answer to an earlier request
   if (sdo->kind == SdoKind::kAbort) {
     return fail(failure, {.kind = FailureKind::kSdoAborted,
-                          .position = where,
+                          .position = position,
                           .object = object_.object,
                           .abort = sdo->abort});
   }

@@ -19,7 +19,8 @@ struct SdoDownload {
 };
 
 /// One SDO at a time: writes the request into the SubDevice's receive mailbox and reads its send
-/// mailbox until the answer is there. An answer to an earlier, repeated request is passed over.
+/// mailbox until the answer is there. An answer to an earlier, repeated request, an emergency and
+/// whatever else comes is passed over; none of it prolongs the deadline.
 class SdoClient {
  public:
   void start_download(const SdoDownload& download, Nanoseconds timeout) noexcept;
@@ -32,6 +33,8 @@ class SdoClient {
 
  private:
   void start(Nanoseconds timeout) noexcept;
+  [[nodiscard]] Progress take(const Datagram& answer, std::uint16_t position, FreeRunningTime now,
+                              Failure& failure) noexcept;
   enum class Step : std::uint8_t { kSend, kReceive };
   Step step_ = Step::kSend;
   SdoKind kind_ = SdoKind::kUploadRequest;

@@ -112,6 +112,7 @@ class Datagram {
     return load<std::uint16_t>(bytes_, bytes_.size() - kWorkingCounterSize);
   }
 
+  constexpr void set_index(std::uint8_t index) const noexcept { bytes_[1] = index; }
   constexpr void set_position(std::uint16_t position) const noexcept { store(bytes_, 2, position); }
   constexpr void add_event(std::uint16_t event) const noexcept {
     store(bytes_, 8, static_cast<std::uint16_t>(this->event() | event));

@@ -124,8 +124,13 @@ Result<SiiContent, SiiError> decode_sii(ConstBytes image) noexcept {
     at += size;
   }
   const ConstBytes device_name = find_string(strings, name_index);
-  std::copy_n(device_name.begin(), std::min(device_name.size(), SiiContent::kMaxName - 1),
-              content.device_name.begin());
+  // A name comes from the wire and goes to terminals and files: printable ASCII alone.
+  std::transform(device_name.begin(),
+                 device_name.begin() + static_cast<std::ptrdiff_t>(
+                                           std::min(device_name.size(), SiiContent::kMaxName - 1)),
+                 content.device_name.begin(), [](std::uint8_t byte) {
+                   return byte >= 0x20 && byte < 0x7F ? static_cast<char>(byte) : '?';
+                 });
   return content;
 }
 

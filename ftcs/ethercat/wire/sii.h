@@ -66,7 +66,7 @@ struct SiiContent {
   std::array<SyncManagerChannel, kMaxSyncManagers> sync_managers{};
   std::size_t sync_manager_count = 0;
   std::uint16_t assign_activate = 0;         ///< what to write to 0x0980 for distributed clocks
-  std::array<char, kMaxName> device_name{};  ///< zero-terminated
+  std::array<char, kMaxName> device_name{};  ///< zero-terminated, printable ASCII
 
   [[nodiscard]] constexpr bool coe() const noexcept {
     return (protocols & sii::kProtocolCoe) != 0 && receive.size > 0 && send.size > 0;
