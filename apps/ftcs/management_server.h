@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "ftcs/platform/local_socket.h"
 #include "ftcs/ptp/management_responder.h"
@@ -37,14 +38,30 @@ class ManagementServer {
 
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
   [[nodiscard]] const std::string& path() const { return socket_.path(); }
-  /// Answers what has arrived; some at a time, so that nobody keeps the clock waiting.
-  void serve(Managed& port);
+  /// Answers what has arrived; some at a time, so that nobody keeps the clock waiting. Tells the
+  /// subscribers (SUBSCRIBE_EVENTS_NP) when the port has another state than the last time.
+  void serve(Managed& port, FreeRunningTime now);
 
  private:
   explicit ManagementServer(platform::LocalSocket socket) : socket_(std::move(socket)) {}
 
+  struct Subscriber {
+    std::string path;
+    ptp::PortIdentity identity{};
+    ptp::SubscribeEventsNp wanted{};
+    FreeRunningTime until{};
+    std::uint16_t next_sequence_id = 0;
+  };
+  void answer(const platform::LocalSocket::Datagram& request, Managed& port, FreeRunningTime now);
+  void subscribe(const std::string& path, const ptp::ManagementResponder::Subscription& asked,
+                 FreeRunningTime now);
+  void notify(Managed& port, FreeRunningTime now);
+  [[nodiscard]] std::vector<Subscriber>::iterator find(const std::string& path);
+
   platform::LocalSocket socket_;
   ptp::ManagementResponder responder_;
+  std::vector<Subscriber> subscribers_;
+  std::optional<ptp::PortState> told_{};  ///< none: nobody listened
 };
 
 }  // namespace ftcs::app

@@ -71,7 +71,7 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
     perform(on_sent(id, std::nullopt, now()));
   }
   report_stamps();
-  if (management_) management_->serve(*managed());
+  if (management_) management_->serve(*managed(), now());
   housekeeping(now());
 }
 

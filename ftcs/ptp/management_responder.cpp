@@ -48,6 +48,8 @@ std::optional<ManagementData> data_of(ManagementId id, const ManagedPort& port) 
       return port.properties;
     case ManagementId::kPortStatsNp:
       return port.stats;
+    case ManagementId::kSubscribeEventsNp:
+      return port.subscription;
   }
   return std::nullopt;
 }
@@ -62,10 +64,23 @@ bool is_of_port(ManagementId id) noexcept {
     case ManagementId::kTimePropertiesDataSet:
     case ManagementId::kDomain:
     case ManagementId::kTimeStatusNp:
+    case ManagementId::kSubscribeEventsNp:
       return false;
     default:
       return true;
   }
+}
+
+/// What of it we tell: the state of the port.
+std::optional<SubscribeEventsNp> subscription_in(const ManagementMessage& request) noexcept {
+  if (request.action() != ManagementAction::kSet || !request.data) return std::nullopt;
+  const auto* const wanted = std::get_if<SubscribeEventsNp>(&*request.data);
+  if (wanted == nullptr) return std::nullopt;
+  constexpr std::uint8_t kTold = 1U << SubscribeEventsNp::kPortState;
+  SubscribeEventsNp granted;
+  granted.duration_s = wanted->duration_s;
+  granted.events[0] = wanted->events[0] & kTold;
+  return granted;
 }
 
 /// The answer's data or error.
@@ -77,6 +92,8 @@ void fill(const ManagementMessage& request, const ManagedPort& port,
     answer.error = ManagementError::kNoSuchId;
   } else if (is_of_port(request.id) && target != kEveryPort && target != port.identity.port) {
     answer.error = ManagementError::kWrongValue;
+  } else if (const auto subscription = subscription_in(request)) {
+    answer.data = *subscription;
   } else if (request.action() == ManagementAction::kSet) {
     answer.error = ManagementError::kNotSetable;
   } else if (request.action() == ManagementAction::kCommand) {
@@ -119,8 +136,25 @@ std::optional<ManagementBytes> ManagementResponder::answer(std::span<const std::
                                                      : ManagementAction::kResponse);
   answer.id = message->id;
   fill(*message, port, answer);
+  if (const auto wanted = subscription_in(*message)) {
+    subscription_ = Subscription{message->header.source, *wanted};
+  }
   ++(answer.error ? counters_.refused : counters_.answered);
   return encode_management(answer);
+}
+
+ManagementBytes ManagementResponder::port_state_notice(const ManagedPort& port,
+                                                       const PortIdentity& subscriber,
+                                                       std::uint16_t sequence_id) noexcept {
+  ManagementMessage notice;
+  notice.header.major_sdo_id = port.major_sdo_id;
+  notice.header.domain = port.domain;
+  notice.header.source = port.identity;
+  notice.header.sequence_id = sequence_id;
+  notice.body.target = subscriber;
+  notice.body.action = static_cast<std::uint8_t>(ManagementAction::kResponse);
+  notice.data = port.port;
+  return encode_management(notice);
 }
 
 }  // namespace ftcs::ptp

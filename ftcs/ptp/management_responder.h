@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "ftcs/ptp/wire/management.h"
 
@@ -25,6 +26,7 @@ struct ManagedPort {
   PortDataSetNp port_np{};
   PortPropertiesNp properties{};
   PortStatsNp stats{};
+  SubscribeEventsNp subscription{};  ///< of who asks
 };
 
 struct ManagementCounters {
@@ -35,17 +37,33 @@ struct ManagementCounters {
 };
 
 /// Answers management messages: GET with a RESPONSE, everything else with an error status, as
-/// nothing can be set. What is addressed to somebody else is not answered (15.3.1).
+/// nothing can be set but a subscription. What is addressed to somebody else is not answered
+/// (15.3.1).
 ///
 /// Sans-I/O; the caller sends what is returned to where the request came from.
 class ManagementResponder {
  public:
   [[nodiscard]] std::optional<ManagementBytes> answer(std::span<const std::uint8_t> request,
                                                       const ManagedPort& port) noexcept;
+  /// Who wants to be told of what, where the request just answered has said so: linuxptp's phc2sys
+  /// -a does.
+  struct Subscription {
+    PortIdentity subscriber{};
+    SubscribeEventsNp wanted{};
+  };
+  [[nodiscard]] std::optional<Subscription> take_subscription() noexcept {
+    return std::exchange(subscription_, std::nullopt);
+  }
+  /// What a subscriber is told when the state of the port has changed: a RESPONSE that nobody asked
+  /// for, with the PORT_DATA_SET.
+  [[nodiscard]] static ManagementBytes port_state_notice(const ManagedPort& port,
+                                                         const PortIdentity& subscriber,
+                                                         std::uint16_t sequence_id) noexcept;
   [[nodiscard]] const ManagementCounters& counters() const noexcept { return counters_; }
 
  private:
   ManagementCounters counters_{};
+  std::optional<Subscription> subscription_{};
 };
 
 }  // namespace ftcs::ptp

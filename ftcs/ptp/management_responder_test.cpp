@@ -76,7 +76,7 @@ TEST_F(Responder, EachIdentifierHasItsData) {
         ManagementId::kCurrentDataSet, ManagementId::kParentDataSet,
         ManagementId::kTimePropertiesDataSet, ManagementId::kPortDataSet, ManagementId::kDomain,
         ManagementId::kTimeStatusNp, ManagementId::kPortDataSetNp, ManagementId::kPortPropertiesNp,
-        ManagementId::kPortStatsNp}) {
+        ManagementId::kPortStatsNp, ManagementId::kSubscribeEventsNp}) {
     const auto answer = ask(request(id));
     ASSERT_TRUE(answer.has_value());
     EXPECT_EQ(answer->id, id);
@@ -95,6 +95,55 @@ TEST_F(Responder, RefusesWhatItDoesNotHaveOrDo) {
   other_port.body.target = {kUs, 2};
   EXPECT_EQ(ask(other_port)->error, ManagementError::kWrongValue);
   EXPECT_EQ(responder.counters().refused, 4U);
+}
+
+SubscribeEventsNp every_event(std::uint16_t duration_s) {
+  SubscribeEventsNp wanted;
+  wanted.duration_s = duration_s;
+  wanted.events.fill(0xFF);
+  return wanted;
+}
+
+TEST_F(Responder, TakesASubscriptionToWhatItTells) {
+  auto asked = request(ManagementId::kSubscribeEventsNp, ManagementAction::kSet);
+  asked.data = every_event(180);
+  const auto answer = ask(asked);
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(answer->action(), ManagementAction::kResponse);
+  const auto& granted = std::get<SubscribeEventsNp>(*answer->data);
+  EXPECT_EQ(granted.duration_s, 180);
+  EXPECT_EQ(granted.events[0], 1U) << "the state of the port";
+  EXPECT_EQ(granted.events[1], 0U);
+  const auto taken = responder.take_subscription();
+  ASSERT_TRUE(taken.has_value());
+  EXPECT_EQ(taken->subscriber, asked.header.source);
+  EXPECT_EQ(taken->wanted, granted);
+  EXPECT_FALSE(responder.take_subscription()) << "once";
+}
+
+TEST_F(Responder, TakesNoSubscriptionThatIsForSomebodyElseOrCutShort) {
+  auto asked = request(ManagementId::kSubscribeEventsNp, ManagementAction::kSet);
+  asked.data = every_event(180);
+  asked.body.target = {kSomebody, 1};
+  EXPECT_FALSE(ask(asked));
+  asked.data.reset();
+  asked.body.target = {kEverybody, 0xFFFF};
+  EXPECT_FALSE(ask(asked));
+  EXPECT_EQ(responder.counters().malformed, 1U);
+  EXPECT_FALSE(responder.take_subscription());
+}
+
+TEST_F(Responder, ANoticeIsTheStateOfThePortAddressedToTheSubscriber) {
+  const PortIdentity subscriber{kSomebody, 9};
+  const auto bytes = ManagementResponder::port_state_notice(managed_port(), subscriber, 5);
+  const auto notice = decode_management(bytes.view());
+  ASSERT_TRUE(notice.ok());
+  EXPECT_EQ(notice->action(), ManagementAction::kResponse);
+  EXPECT_EQ(notice->body.target, subscriber);
+  EXPECT_EQ(notice->header.sequence_id, 5);
+  EXPECT_EQ(notice->header.domain, 3);
+  EXPECT_EQ(notice->header.source, (PortIdentity{kUs, 1}));
+  EXPECT_EQ(std::get<PortDataSet>(*notice->data).state, PortState::kTimeReceiver);
 }
 
 TEST_F(Responder, IsSilentToWhatIsNotForIt) {

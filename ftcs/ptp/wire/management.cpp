@@ -260,36 +260,41 @@ void fields(Stream& stream, Data& data) noexcept {
   for (auto& count : data.sent) stream.little_endian(count);
 }
 
-std::optional<ManagementData> empty_data(ManagementId id) noexcept {
-  switch (id) {
-    case ManagementId::kNullManagement:
-      return NullManagement{};
-    case ManagementId::kClockDescription:
-      return ClockDescription{};
-    case ManagementId::kUserDescription:
-      return UserDescription{};
-    case ManagementId::kDefaultDataSet:
-      return DefaultDataSet{};
-    case ManagementId::kCurrentDataSet:
-      return CurrentDataSet{};
-    case ManagementId::kParentDataSet:
-      return ParentDataSet{};
-    case ManagementId::kTimePropertiesDataSet:
-      return TimePropertiesDataSet{};
-    case ManagementId::kPortDataSet:
-      return PortDataSet{};
-    case ManagementId::kDomain:
-      return Domain{};
-    case ManagementId::kTimeStatusNp:
-      return TimeStatusNp{};
-    case ManagementId::kPortDataSetNp:
-      return PortDataSetNp{};
-    case ManagementId::kPortPropertiesNp:
-      return PortPropertiesNp{};
-    case ManagementId::kPortStatsNp:
-      return PortStatsNp{};
-  }
-  return std::nullopt;
+template <class Stream, DataOf<SubscribeEventsNp> Data>
+void fields(Stream& stream, Data& data) noexcept {
+  stream.integer(data.duration_s);
+  stream.octets(data.events);
+}
+
+constexpr std::array kIds{ManagementId::kNullManagement,
+                          ManagementId::kClockDescription,
+                          ManagementId::kUserDescription,
+                          ManagementId::kDefaultDataSet,
+                          ManagementId::kCurrentDataSet,
+                          ManagementId::kParentDataSet,
+                          ManagementId::kTimePropertiesDataSet,
+                          ManagementId::kPortDataSet,
+                          ManagementId::kDomain,
+                          ManagementId::kTimeStatusNp,
+                          ManagementId::kPortDataSetNp,
+                          ManagementId::kPortPropertiesNp,
+                          ManagementId::kPortStatsNp,
+                          ManagementId::kSubscribeEventsNp};
+static_assert(kIds.size() == std::variant_size_v<ManagementData>);
+
+template <std::size_t... kIndex>
+std::optional<ManagementData> empty_data(ManagementId id, std::index_sequence<kIndex...>) noexcept {
+  std::optional<ManagementData> data;
+  static_cast<void>(
+      ((kIds[kIndex] == id && (data.emplace(std::in_place_index<kIndex>), true)) || ...));
+  return data;
+}
+
+/// Of requests data is read where it is the question: what a GET carries are dummies.
+bool has_data(const ManagementMessage& message) noexcept {
+  return message.action() == ManagementAction::kResponse ||
+         (message.action() == ManagementAction::kSet &&
+          message.id == ManagementId::kSubscribeEventsNp);
 }
 
 DecodeError bad_tlv(std::size_t expected, std::size_t received, std::size_t offset) noexcept {
@@ -298,7 +303,7 @@ DecodeError bad_tlv(std::size_t expected, std::size_t received, std::size_t offs
 
 /// Reads the value of a management TLV into `message`; false if it does not have its length.
 bool read_data(std::span<const std::uint8_t> value, ManagementMessage& message) noexcept {
-  message.data = empty_data(message.id);
+  message.data = empty_data(message.id, std::make_index_sequence<kIds.size()>{});
   if (!message.data) return true;  // of no concern to us
   Reader reader(value);
   std::visit([&reader](auto& data) { fields(reader, data); }, *message.data);
@@ -307,23 +312,7 @@ bool read_data(std::span<const std::uint8_t> value, ManagementMessage& message) 
 
 }  // namespace
 
-ManagementId id_of(const ManagementData& data) noexcept {
-  static constexpr std::array kIds{ManagementId::kNullManagement,
-                                   ManagementId::kClockDescription,
-                                   ManagementId::kUserDescription,
-                                   ManagementId::kDefaultDataSet,
-                                   ManagementId::kCurrentDataSet,
-                                   ManagementId::kParentDataSet,
-                                   ManagementId::kTimePropertiesDataSet,
-                                   ManagementId::kPortDataSet,
-                                   ManagementId::kDomain,
-                                   ManagementId::kTimeStatusNp,
-                                   ManagementId::kPortDataSetNp,
-                                   ManagementId::kPortPropertiesNp,
-                                   ManagementId::kPortStatsNp};
-  static_assert(kIds.size() == std::variant_size_v<ManagementData>);
-  return kIds[data.index()];
-}
+ManagementId id_of(const ManagementData& data) noexcept { return kIds[data.index()]; }
 
 Result<ManagementMessage, DecodeError> decode_management(
     std::span<const std::uint8_t> bytes) noexcept {
@@ -350,7 +339,7 @@ Result<ManagementMessage, DecodeError> decode_management(
   ManagementMessage message{decoded->header, *body};
   if (type == kErrorTlv) message.error = static_cast<ManagementError>(reader.read<std::uint16_t>());
   message.id = static_cast<ManagementId>(reader.read<std::uint16_t>());
-  if (type == kErrorTlv || message.action() != ManagementAction::kResponse) return message;
+  if (type == kErrorTlv || !has_data(message)) return message;
   const auto value = tlvs.subspan(reader.offset(), size - 2U);
   if (read_data(value, message)) return message;
   return bad_tlv(value.size() + 2, value.size(), kBodySize + 2);  // even, and not this

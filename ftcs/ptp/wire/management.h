@@ -27,6 +27,7 @@ enum class ManagementId : std::uint16_t {
   kDomain = 0x2007,
   kTimeStatusNp = 0xC000,
   kPortDataSetNp = 0xC002,
+  kSubscribeEventsNp = 0xC003,
   kPortPropertiesNp = 0xC004,
   kPortStatsNp = 0xC005,
 };
@@ -193,10 +194,19 @@ struct PortStatsNp {
   friend constexpr bool operator==(const PortStatsNp&, const PortStatsNp&) noexcept = default;
 };
 
+/// linuxptp's SUBSCRIBE_EVENTS_NP: who asks is told of these events for so long.
+struct SubscribeEventsNp {
+  static constexpr std::size_t kPortState = 0;  ///< a PORT_DATA_SET when the port's state changes
+  std::uint16_t duration_s = 0;
+  std::array<std::uint8_t, 64> events{};  ///< event n: bit n mod 8 of octet n / 8
+  friend constexpr bool operator==(const SubscribeEventsNp&,
+                                   const SubscribeEventsNp&) noexcept = default;
+};
+
 using ManagementData =
     std::variant<NullManagement, ClockDescription, UserDescription, DefaultDataSet, CurrentDataSet,
                  ParentDataSet, TimePropertiesDataSet, PortDataSet, Domain, TimeStatusNp,
-                 PortDataSetNp, PortPropertiesNp, PortStatsNp>;
+                 PortDataSetNp, PortPropertiesNp, PortStatsNp, SubscribeEventsNp>;
 
 /// The identifier of what a variant holds.
 [[nodiscard]] ManagementId id_of(const ManagementData& data) noexcept;
@@ -207,8 +217,8 @@ struct ManagementMessage {
   Management body{};
   ManagementId id = ManagementId::kNullManagement;  ///< any 16 bits may come
   std::optional<ManagementError> error{};           ///< of a refusal
-  /// Of a RESPONSE with an id that is known here; a request's data is not read, as GET carries
-  /// dummies.
+  /// Of a RESPONSE with an id that is known here, and of a SET of SUBSCRIBE_EVENTS_NP; another
+  /// request's data is not read, as GET carries dummies.
   std::optional<ManagementData> data{};
 
   [[nodiscard]] constexpr ManagementAction action() const noexcept {
