@@ -5,23 +5,22 @@
 #include <cmath>
 
 #include "ftcs/clock/command_check.h"
+#include "ftcs/clock/wide.h"
 
 namespace ftcs {
 namespace {
 
-__extension__ using Wide = __int128;
-
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 // Quotient rounded towards minus infinity; divisor > 0.
-[[nodiscard]] constexpr Wide floor_divide(Wide dividend, Wide divisor) noexcept {
-  const Wide quotient = dividend / divisor;
+[[nodiscard]] constexpr Int128 floor_divide(Int128 dividend, Int128 divisor) noexcept {
+  const Int128 quotient = dividend / divisor;
   return dividend % divisor < 0 ? quotient - 1 : quotient;
 }
 
-[[nodiscard]] constexpr Duration multiply(Duration step, Wide count) noexcept {
-  const Wide units = (static_cast<Wide>(step.floor_ns()) << 32) + step.fraction();
-  const Wide product = units * count;
+[[nodiscard]] constexpr Duration multiply(Duration step, Int128 count) noexcept {
+  const Int128 units = (static_cast<Int128>(step.floor_ns()) << 32) + step.fraction();
+  const Int128 product = units * count;
   return Duration::from_parts(static_cast<std::int64_t>(product >> 32),
                               static_cast<std::uint32_t>(product));
 }
@@ -96,8 +95,8 @@ Rate AddendClock::rate_at(FreeRunningTime instant) const noexcept {
 // down to that.
 std::int64_t AddendClock::ticks_at(FreeRunningTime instant) const noexcept {
   const Duration elapsed = instant - config_.free_running;
-  const auto frequency = static_cast<Wide>(config_.nominal_frequency_hz);
-  const Wide scaled = elapsed.floor_ns() * frequency + ((elapsed.fraction() * frequency) >> 32);
+  const auto frequency = static_cast<Int128>(config_.nominal_frequency_hz);
+  const Int128 scaled = elapsed.floor_ns() * frequency + ((elapsed.fraction() * frequency) >> 32);
   return static_cast<std::int64_t>(floor_divide(scaled, kNanosecondsPerSecond));
 }
 
@@ -113,15 +112,15 @@ std::uint64_t AddendClock::addend_for(Rate rate) const noexcept {
 AddendClock::Segment AddendClock::advanced(const Segment& from,
                                            FreeRunningTime instant) const noexcept {
   const std::int64_t tick = ticks_at(instant);
-  const Wide period = std::max<std::uint32_t>(config_.dither_ticks, 1);
-  const Wide ticks = static_cast<Wide>(tick) - from.first_tick;
-  const Wide periods = floor_divide(ticks, period);
-  const Wide wanted =
-      periods * static_cast<Wide>(from.addend) + static_cast<Wide>(from.dither_error);
-  const Wide chosen = wanted >> kAddendFractionBits;
-  const Wide next = ((wanted + static_cast<Wide>(from.addend)) >> kAddendFractionBits) - chosen;
-  const Wide total =
-      static_cast<Wide>(from.accumulator) + period * chosen + (ticks - periods * period) * next;
+  const Int128 period = std::max<std::uint32_t>(config_.dither_ticks, 1);
+  const Int128 ticks = static_cast<Int128>(tick) - from.first_tick;
+  const Int128 periods = floor_divide(ticks, period);
+  const Int128 wanted =
+      periods * static_cast<Int128>(from.addend) + static_cast<Int128>(from.dither_error);
+  const Int128 chosen = wanted >> kAddendFractionBits;
+  const Int128 next = ((wanted + static_cast<Int128>(from.addend)) >> kAddendFractionBits) - chosen;
+  const Int128 total =
+      static_cast<Int128>(from.accumulator) + period * chosen + (ticks - periods * period) * next;
 
   Segment to = from;
   to.first_instant = instant;

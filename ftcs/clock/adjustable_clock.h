@@ -25,8 +25,6 @@ enum class ClockError : std::uint8_t {
 /// others by a timer).
 class AdjustableClock {
  public:
-  virtual ~AdjustableClock() = default;
-
   /// Both faces of the clock at one instant.
   [[nodiscard]] virtual ClockReading read() noexcept = 0;
   /// What the steered clock showed (or, for an instant to come, would show) when the free-running
@@ -45,19 +43,22 @@ class AdjustableClock {
   AdjustableClock() = default;
   AdjustableClock(const AdjustableClock&) = default;
   AdjustableClock& operator=(const AdjustableClock&) = default;
+  // Not virtual: nobody deletes through the base, and operator delete needs a heap.
+  ~AdjustableClock() = default;
 };
 
 /// An injected free-running oscillator (CLOCK_MONOTONIC_RAW on a PC, simulated time in the
 /// laboratory).
 class FreeRunningSource {
  public:
-  virtual ~FreeRunningSource() = default;
   [[nodiscard]] virtual FreeRunningTime now() noexcept = 0;
 
  protected:
   FreeRunningSource() = default;
   FreeRunningSource(const FreeRunningSource&) = default;
   FreeRunningSource& operator=(const FreeRunningSource&) = default;
+  // Not virtual: nobody deletes through the base, and operator delete needs a heap.
+  ~FreeRunningSource() = default;
 };
 
 }  // namespace ftcs

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "ftcs/clock/wide.h"
 #include "ftcs/time/instant.h"
 #include "ftcs/time/rate.h"
 
@@ -73,9 +74,6 @@ class AffineMap {
   }
 
  private:
-  __extension__ using Wide = __int128;
-  __extension__ using UnsignedWide = unsigned __int128;
-
   struct Position {
     To to;
     std::uint64_t residue = 0;  // below 2^-32 ns, in units of 2^-85 ns
@@ -90,10 +88,11 @@ class AffineMap {
     constexpr int kBits = FixedRate::kFractionBits;
     constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
     const Duration elapsed = instant - from_base_;
-    const Wide whole = static_cast<Wide>(elapsed.floor_ns()) * static_cast<Wide>(rate_.scaled());
-    const UnsignedWide below_one =
-        (static_cast<UnsignedWide>(static_cast<std::uint64_t>(whole) & kMask) << 32) +
-        static_cast<UnsignedWide>(elapsed.fraction()) * rate_.scaled() + residue_;
+    const Int128 whole =
+        static_cast<Int128>(elapsed.floor_ns()) * static_cast<Int128>(rate_.scaled());
+    const UInt128 below_one =
+        (static_cast<UInt128>(static_cast<std::uint64_t>(whole) & kMask) << 32) +
+        static_cast<UInt128>(elapsed.fraction()) * rate_.scaled() + residue_;
     const auto advance = Duration::from_parts(static_cast<std::int64_t>(whole >> kBits), 0) +
                          Duration::from_parts(static_cast<std::int64_t>(below_one >> (kBits + 32)),
                                               static_cast<std::uint32_t>(below_one >> kBits));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/servo/any_servo.h"
 
+#include "ftcs/time/visit.h"
+
 namespace ftcs {
 namespace {
 
@@ -103,15 +105,15 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
 }
 
 ServoUpdate AnyServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
-  return std::visit([&](auto& servo) noexcept { return servo.update(pair, now); }, servo_);
+  return ftcs::visit([&](auto& servo) noexcept { return servo.update(pair, now); }, servo_);
 }
 
 void AnyServo::reset() noexcept {
-  std::visit([](auto& servo) noexcept { servo.reset(); }, servo_);
+  ftcs::visit([](auto& servo) noexcept { servo.reset(); }, servo_);
 }
 
 void AnyServo::on_step(Duration step) noexcept {
-  std::visit(
+  ftcs::visit(
       [step](auto& servo) noexcept {
         if constexpr (requires { servo.on_step(step); }) servo.on_step(step);
       },
@@ -119,7 +121,7 @@ void AnyServo::on_step(Duration step) noexcept {
 }
 
 void AnyServo::free_path_delay(double sigma_ns) noexcept {
-  std::visit(
+  ftcs::visit(
       [sigma_ns](auto& servo) noexcept {
         if constexpr (requires { servo.free_path_delay(sigma_ns); }) {
           servo.free_path_delay(sigma_ns);
@@ -129,11 +131,11 @@ void AnyServo::free_path_delay(double sigma_ns) noexcept {
 }
 
 ServoSnapshot AnyServo::snapshot() const noexcept {
-  return std::visit([](const auto& servo) noexcept { return servo.snapshot(); }, servo_);
+  return ftcs::visit([](const auto& servo) noexcept { return servo.snapshot(); }, servo_);
 }
 
 ServoSnapshot AnyServo::snapshot_at(const ClockReading& now) const noexcept {
-  return std::visit(
+  return ftcs::visit(
       [&now](const auto& servo) noexcept {
         if constexpr (requires { servo.snapshot_at(now); }) return servo.snapshot_at(now);
         return servo.snapshot();

@@ -2,6 +2,7 @@
 #include "ftcs/ptp/wire/byte_order.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "ftcs/ptp/wire/fields.h"
+#include "ftcs/time/visit.h"
 
 namespace ftcs::ptp {
 namespace {
@@ -164,7 +165,7 @@ Result<MessageBytes, EncodeError> encode(const Message& message) noexcept {
   bytes.size = static_cast<std::uint8_t>(size_of(type) + tlv_size(message.body));
   FieldWriter writer({bytes.octets.data(), bytes.size});
   write_header(message.header, type, bytes.size, *correction, writer);
-  std::visit(BodyWriter{writer}, message.body);
+  ftcs::visit(BodyWriter{writer}, message.body);
   if (!writer.in_range()) return EncodeError::kTimestampOutOfRange;
   return bytes;
 }

@@ -5,6 +5,7 @@
 
 #include "ftcs/ptp/wire/byte_order.h"
 #include "ftcs/ptp/wire/fields.h"
+#include "ftcs/time/visit.h"
 
 namespace ftcs::ptp {
 namespace {
@@ -306,7 +307,7 @@ bool read_data(std::span<const std::uint8_t> value, ManagementMessage& message) 
   message.data = empty_data(message.id, std::make_index_sequence<kIds.size()>{});
   if (!message.data) return true;  // of no concern to us
   Reader reader(value);
-  std::visit([&reader](auto& data) { fields(reader, data); }, *message.data);
+  ftcs::visit([&reader](auto& data) { fields(reader, data); }, *message.data);
   return reader.complete();
 }
 
@@ -361,7 +362,7 @@ ManagementBytes encode_management(const ManagementMessage& message) noexcept {
     const ManagementId id = message.data ? id_of(*message.data) : message.id;
     writer.integer(static_cast<std::uint16_t>(id));
     if (message.data) {
-      std::visit([&writer](const auto& data) { fields(writer, data); }, *message.data);
+      ftcs::visit([&writer](const auto& data) { fields(writer, data); }, *message.data);
     }
     writer.reserved(writer.size() % 2);  // 14.1: lengths are even
   }

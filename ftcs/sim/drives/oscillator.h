@@ -15,13 +15,14 @@ using WireTime = Instant<WireTimescale>;
 /// return later than their successor arrives).
 class LocalOscillator {
  public:
-  virtual ~LocalOscillator() = default;
   [[nodiscard]] virtual Duration reading(WireTime instant) noexcept = 0;
 
  protected:
   LocalOscillator() = default;
   LocalOscillator(const LocalOscillator&) = default;
   LocalOscillator& operator=(const LocalOscillator&) = default;
+  // Not virtual: nobody deletes through the base, and operator delete needs a heap.
+  ~LocalOscillator() = default;
 };
 
 /// reading = initial + rate * (instant - start); the rate may be changed on the way.
