@@ -1,5 +1,7 @@
 # cmake --install: the program, and the cycle servo for programs in C, found by find_package(ftcs) or pkg-config.
-install(TARGETS ftcs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+if(TARGET ftcs)
+  install(TARGETS ftcs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
 install(TARGETS ftcs_cycle_servo ftcs_cycle_servo_small EXPORT ftcs
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 # The include path is the file path, installed or not.

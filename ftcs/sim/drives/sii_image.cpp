@@ -180,14 +180,15 @@ void SiiInterface::read(std::uint32_t word) noexcept {
   constexpr std::size_t kBytes = 8;
   for (std::size_t i = 0; i < kBytes; ++i) {
     const std::uint64_t at = std::uint64_t{word} * 2 + i;
-    memory_.set(reg::kSiiData + i, at < image_.size() ? image_[at] : std::uint8_t{0xFF});
+    memory_.set(reg::kSiiData + i,
+                at < image_.size() ? image_[static_cast<std::size_t>(at)] : std::uint8_t{0xFF});
   }
 }
 
 bool SiiInterface::write(std::uint32_t word) noexcept {
   const std::uint64_t at = std::uint64_t{word} * 2;
   if (at + 2 > image_.size()) return false;
-  store(Bytes{image_}, at, memory_.get<std::uint16_t>(reg::kSiiData));
+  store(Bytes{image_}, static_cast<std::size_t>(at), memory_.get<std::uint16_t>(reg::kSiiData));
   return true;
 }
 

@@ -183,8 +183,10 @@ bool SubDevice::map(const FmmuChannel& channel, const Datagram& datagram, bool w
   const std::uint64_t end =
       std::min(wanted + data.size(), std::uint64_t{channel.logical_start} + channel.length);
   if (first >= end) return false;
-  const Bytes part = data.subspan(first - wanted, end - first);
-  const std::size_t address = channel.physical_start + (first - channel.logical_start);
+  const Bytes part =
+      data.subspan(static_cast<std::size_t>(first - wanted), static_cast<std::size_t>(end - first));
+  const std::size_t address =
+      channel.physical_start + static_cast<std::size_t>(first - channel.logical_start);
   return write ? this->write(address, part, sof) : read(address, part, false);
 }
 
@@ -200,13 +202,14 @@ bool SubDevice::map_bits(const FmmuChannel& channel, const Datagram& datagram,
   for (std::uint64_t bit = std::max(start, wanted); bit < std::min(end, wanted + data.size() * 8);
        ++bit) {
     const std::uint64_t here = physical + (bit - start);
-    if (!EscMemory::contains(here / 8, 1) || (write && !writable(here / 8))) return any;
+    const auto address = static_cast<std::size_t>(here / 8);
+    if (!EscMemory::contains(address, 1) || (write && !writable(address))) return any;
     const Bytes memory = memory_.bytes();
-    std::uint8_t& there = data[(bit - wanted) / 8];
+    std::uint8_t& there = data[static_cast<std::size_t>((bit - wanted) / 8)];
     const auto there_mask = static_cast<std::uint8_t>(1U << (bit % 8));
     const auto here_mask = static_cast<std::uint8_t>(1U << (here % 8));
-    std::uint8_t& target = write ? memory[here / 8] : there;
-    const bool value = write ? (there & there_mask) != 0 : (memory[here / 8] & here_mask) != 0;
+    std::uint8_t& target = write ? memory[address] : there;
+    const bool value = write ? (there & there_mask) != 0 : (memory[address] & here_mask) != 0;
     const std::uint8_t mask = write ? here_mask : there_mask;
     target = static_cast<std::uint8_t>(value ? target | mask : target & ~mask);
     any = true;
