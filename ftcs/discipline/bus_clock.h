@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "ftcs/discipline/lock_detector.h"
+#include "ftcs/servo/any_servo.h"
+
+namespace ftcs {
+
+struct BusClockConfig {
+  /// False: the offset is told and nothing is moved.
+  bool steer = true;
+  Nanoseconds cycle{1'000'000};  ///< above zero
+  double sync0_phase = 0.5;      ///< SYNC0 comes this part of a cycle after the frame; 0 to 1
+  /// The samples of so long a time are averaged before the estimator hears them; >= cycle.
+  Nanoseconds sample_interval{125'000'000};
+  /// An offset is removed with this time constant, where no limit binds; several sample intervals.
+  Nanoseconds time_constant{500'000'000};
+  /// Of the bus against the crystal of the reference clock: the crystal's own deviation and what is
+  /// pulled beside it. Drives fault at some 600 ppm (docs/ethercat.md).
+  RateLimits limits = RateLimits::symmetric_ppb(4e5);
+  double largest_pull_ppb = 5e4;         ///< beside the rate that tracks
+  double largest_slope_ppb_per_s = 1e5;  ///< of any change of the rate
+  /// Sample intervals without a sample before it is holdover.
+  std::uint32_t missed_intervals_to_holdover = 8;
+  LockConfig lock{{Nanoseconds{500}, Nanoseconds{2'000}}, 8};
+};
+
+/// One cycle: what the reference clock of the bus and plant time showed at one instant.
+struct BusClockSample {
+  bool usable = false;     ///< both are known and nothing speaks against them
+  LocalTime dc;            ///< system time of the reference clock, latched by the frame
+  ReferenceTime plant;     ///< plant time at the same instant
+  std::int64_t offset_ns;  ///< what had been added to the system time offset when it was latched
+};
+
+enum class BusClockState : std::uint8_t {
+  kWaiting,    ///< no plant time yet
+  kAcquiring,  ///< known, not yet within the band
+  kLocked,
+  kHoldover,  ///< plant time stays away: the last rate is kept
+};
+[[nodiscard]] const char* name(BusClockState state) noexcept;
+
+struct BusClockDecision {
+  BusClockState state = BusClockState::kWaiting;
+  bool known = false;  ///< dc_to_plant means something
+  /// System time minus plant time at SYNC0, filtered: positive, the bus is ahead.
+  Duration dc_to_plant{};
+  double sigma_ns = 0.0;  ///< honest standard deviation of it; grows in holdover
+  /// Rate of the bus that would be plant time's, per crystal of the reference clock.
+  Rate tracking;
+  double rate_ppb = 0.0;  ///< what the bus is bent by at present, per its crystal
+  /// To be added to 0x0920 of the reference clock, in total since the start, by the next frame.
+  std::int64_t offset_ns = 0;
+};
+
+/// Plant time for an EtherCAT segment: tells how far the distributed clock is from plant time, and
+/// lets it follow slowly ("external synchronisation", DCX) or at the pace of the host ("bus
+/// shift").
+///
+/// The system time of the reference clock is R = L + offset, L the clock's own crystal, offset the
+/// register 0x0920. A written 0x0910 would carry the lateness of the frame that carries it; an
+/// increment of 0x0920 is a difference, and a difference has no lateness: each cycle a few
+/// nanoseconds are added, so that R runs at a commanded rate per L (decision 0016). L is known
+/// exactly, because the offset is our own; the adaptive servo's estimator hears (plant, L) and
+/// tells offset e, rate and deviation without being moved by what is steered.
+///
+///   target rate of R per L   = tracking - 1 + pull
+///   pull                     = -sign(e) min(|e| / T, pull_max, 0.7 sqrt(2 s |e|))
+///   rate                    -> target, by at most s = largest_slope per second
+///
+/// Between two frames R runs with L and not with plant time: a saw tooth of 100 ns at 100 ppm and
+/// 1 ms. e is what it is at SYNC0, the instant that drives act on.
+///
+/// The root is the speed from which the slope still brakes to a stand: no overshoot. A value;
+/// nothing waits, nothing allocates. No jump after the start, whatever plant time does.
+class BusClock {
+ public:
+  explicit BusClock(const BusClockConfig& config) noexcept;
+
+  /// Once in each cycle, usable or not. The decision holds for the next frame.
+  const BusClockDecision& update(const BusClockSample& sample) noexcept;
+  /// Plant time comes from somewhere else, or the bus was put elsewhere: what is known is void; the
+  /// rate is kept.
+  void on_new_plant_time() noexcept;
+  [[nodiscard]] const BusClockDecision& decision() const noexcept { return decision_; }
+
+ private:
+  void carry_on() noexcept;
+  void average(const BusClockSample& sample) noexcept;
+  void estimate() noexcept;
+  void judge() noexcept;
+  void move() noexcept;
+  [[nodiscard]] double pull() const noexcept;
+  [[nodiscard]] double cycle_ns() const noexcept {
+    return static_cast<double>(config_.cycle.count());
+  }
+
+  BusClockConfig config_;
+  AdaptiveServo estimator_;
+  LockDetector lock_;
+  BusClockDecision decision_;
+  std::uint32_t cycles_per_sample_;
+  std::uint32_t cycles_ = 0;  ///< of the sample under way
+  std::uint32_t used_ = 0;    ///< of them usable
+  BusClockSample first_;      ///< usable one of the sample under way
+  double sum_crystal_ns_ = 0.0;
+  double sum_plant_ns_ = 0.0;
+  ReferenceTime last_plant_;
+  std::uint32_t missed_ = 0;  ///< sample intervals without a sample
+  double error_ns_ = 0.0;     ///< e, carried on between samples
+  double tracking_ = 0.0;     ///< deviation of the rate that tracks
+  double rate_ = 0.0;         ///< deviation that is commanded
+  double offset_ns_ = 0.0;    ///< integral of it
+  FreeRunningTime crystal_;   ///< L of the last usable sample
+  bool started_ = false;
+};
+
+}  // namespace ftcs
