@@ -4,9 +4,11 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "ftcs/servo/any_servo.h"
+
+namespace CLI {
+class App;  // the whole of it is for the files that add flags: it costs seconds in each
+}
 
 namespace ftcs::app {
 
