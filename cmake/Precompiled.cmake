@@ -28,7 +28,8 @@ function(ftcs_use_precompiled target name)
       target_compile_options(${target} PRIVATE -fpch-preprocess)
       if(NOT name STREQUAL realtime)
         # g++ 12 warns of its own std::string (GCC bug 105651) where it does not see that the header is the system's.
-        target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-restrict)
+        target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overread
+          -Wno-stringop-overflow)
       endif()
     endif()
   endif()
