@@ -2,7 +2,6 @@
 #include "apps/ftcs/leap_seconds.h"
 
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -83,11 +82,6 @@ std::optional<LeapSeconds::State> LeapSeconds::at(std::int64_t utc_s) const {
     }
   }
   return state;
-}
-
-bool is_last_day_of_month(std::int64_t utc_s) {
-  const std::chrono::sys_days today{std::chrono::days{day_of(utc_s)}};
-  return std::chrono::year_month_day{today + std::chrono::days{1}}.day() == std::chrono::day{1};
 }
 
 }  // namespace ftcs::app

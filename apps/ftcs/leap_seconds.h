@@ -43,7 +43,4 @@ class LeapSeconds {
   std::optional<std::int64_t> updated_;
 };
 
-/// Does a UTC month end with this day? Leap seconds happen at no other time (ITU-R TF.460).
-[[nodiscard]] bool is_last_day_of_month(std::int64_t utc_s);
-
 }  // namespace ftcs::app

@@ -50,12 +50,5 @@ TEST(LeapSeconds, names_the_line_that_is_wrong) {
             std::string::npos);
 }
 
-TEST(LeapSeconds, knows_the_days_on_which_they_can_be) {
-  EXPECT_TRUE(is_last_day_of_month(kNewYear2017 - 1));
-  EXPECT_FALSE(is_last_day_of_month(kNewYear2017));
-  EXPECT_TRUE(is_last_day_of_month(951'782'400));   // 29 February 2000
-  EXPECT_FALSE(is_last_day_of_month(951'695'999));  // the end of 27 February 2000
-}
-
 }  // namespace
 }  // namespace ftcs::app

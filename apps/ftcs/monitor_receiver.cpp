@@ -75,18 +75,17 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
   log_lock();
 }
 
-// Before the next sample: it would be seconds off, and steered.
+// Before the next sample, which would be seconds off. The clock is never stepped for it.
 void MonitorReceiver::follow_scale_change() {
-  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_timescale();
+  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_reference();
 }
 
 // A real clock shows UTC or TAI, chrony UTC; ptp4l's reports do not say which the reference does.
 // Nor do they have its peer delay messages, but it tells what they came to.
 void MonitorReceiver::ask_ptp4l(FreeRunningTime now) {
   constexpr Duration kInterval{std::chrono::seconds{1}};
-  constexpr Duration kScaleInterval{std::chrono::seconds{30}};
   if (needs_scale() && now >= next_scale_question_) {
-    next_scale_question_ = now + (scale_known_ ? kScaleInterval : kInterval);
+    next_scale_question_ = now + kInterval;
     client_->ask(ptp::ManagementId::kTimePropertiesDataSet);
   }
   if (options().peer_to_peer() && source_.counters().syncs > 0 && now >= next_link_question_) {
@@ -156,6 +155,7 @@ void MonitorReceiver::on_sample(const ptp::MonitorSample& sample) {
     log()(LogLevel::kWarning, "ptp4l: another transmitter, or its time jumped; starting anew");
     follower_.on_new_reference();
   }
+  if (!admits(event->pair)) return;
   if (const auto wrong = follower_.on_pair(event->pair, now(), source_.sync_interval()))
     return fail(*wrong);
   feed_others(follower_);

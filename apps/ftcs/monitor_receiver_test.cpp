@@ -130,26 +130,31 @@ TEST_F(MonitorReceiverTest, an_offset_of_seconds_ends_the_run_where_no_step_is_a
   EXPECT_NEAR(kernel.system.steering(), 1.0, 1e-15) << "and touches nothing";
 }
 
-TEST_F(MonitorReceiverTest, a_wrong_utc_offset_that_is_put_right_is_stepped_and_not_slewed) {
+TEST_F(MonitorReceiverTest, a_utc_offset_that_is_put_right_is_slewed_and_never_stepped) {
   options.first_step = true;
   utc_offset = 36;
+  double last = 0.0;
+  double largest_move = 0.0;  // in a turn, after the start
   on_turn = [&] {
     if (kernel.ideal_ns > 20 * kSecond) utc_offset = 37;
+    if (kernel.ideal_ns > 19 * kSecond) {
+      largest_move = std::max(largest_move, std::abs(error() - last));
+    }
+    last = error();
   };
-  options.duration = Duration::from_ns(100 * kSecond);
+  options.duration = Duration::from_ns(120 * kSecond);
   EXPECT_EQ(run(), kSuccess);
-  EXPECT_NEAR(error(), 0.0, 100.0) << "asked again every 30 s";
+  EXPECT_NEAR(error(), 0.0, 100.0);
+  EXPECT_LT(largest_move, 0.1 * kSecond);
 }
 
-TEST_F(MonitorReceiverTest, and_ends_the_run_where_no_step_is_allowed) {
-  utc_offset = 36;
-  kernel.system.time_ns = kSecond;
+TEST_F(MonitorReceiverTest, a_utc_offset_that_cannot_be_true_changes_nothing) {
   on_turn = [&] {
     if (kernel.ideal_ns > 20 * kSecond) utc_offset = 34;
   };
   options.duration = Duration::from_ns(100 * kSecond);
-  EXPECT_EQ(run(), kRuntimeError);
-  EXPECT_NEAR(error(), kSecond, 1e3);
+  EXPECT_EQ(run(), kSuccess);
+  EXPECT_NEAR(error(), 0.0, 100.0);
 }
 
 TEST_F(MonitorReceiverTest, steers_nothing_before_the_timescale_is_known) {

@@ -79,6 +79,7 @@ void add_ptp4l_flags(CLI::App& command, PtpArguments& arguments) {
 
 void add_servo_flags(CLI::App& command, PtpArguments& arguments) {
   add_steering_flags(command, arguments.steering);
+  add_epoch_flags(command, arguments.epoch);
   Flags flags(command);
   flags.value("--offset-gain", arguments.offset_gain, "P",
               "ftcs: p inside the band, 0 to 1; default 1/16");

@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/steering_arguments.h"
 
 namespace ftcs::app {
@@ -27,6 +28,7 @@ struct PtpArguments {
   std::string chrony_socket;
   std::optional<int> ntp_shm_unit;
   SteeringArguments steering;
+  EpochArguments epoch;
   std::optional<double> offset_gain;
   std::string converged_band;
   std::optional<std::uint32_t> converged_dwell;

@@ -62,6 +62,8 @@ Result<PtpClocks, std::string> open_ptp_clocks(platform::Kernel& kernel, const P
   UtcConfig utc;
   utc.utc_offset = options.utc_offset;
   utc.kernel_leap = options.kernel_leap;
+  utc.epoch = options.epoch;
+  if (options.free_running) utc.epoch = {true, 0, {}, {}, {}};  // measuring alone harms nothing
   if (!options.leap_file.empty()) {
     auto list = LeapSeconds::read_file(options.leap_file);
     if (!list) return list.error();

@@ -41,6 +41,7 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   ServoConfig& servo = options.servo;
   if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
+  options.epoch = epoch_rules(arguments.epoch);
   // Debian's ptp4l.conf names it, and its user may never have chosen.
   if (arguments.steering.servo.empty() && servo.kind == ServoKind::kLinuxptpPi) {
     options.notes.emplace_back(

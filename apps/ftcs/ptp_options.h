@@ -8,6 +8,7 @@
 
 #include "apps/ftcs/steering_arguments.h"
 #include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/node/epoch_gate.h"
 #include "ftcs/platform/ptp_socket.h"
 #include "ftcs/platform/timestamp_clock.h"
 #include "ftcs/ptp/acceptable_transmitters.h"
@@ -86,6 +87,7 @@ struct PtpOptions {
   ServoConfig servo = ptp_servo_defaults();
   bool delay_filter_given = false;  ///< by the user: the adaptive servo has a default of its own
   SteeringRules steering{};
+  node::EpochRules epoch{};
   ClockKind clock = ClockKind::kVirtual;
   std::string clock_device{};  ///< kPhc: must be the interface's clock; empty: it is
   std::string leap_file{};     ///< leap-seconds.list

@@ -28,7 +28,8 @@ VirtualClockConfig clock_config(const PtpOptions& options,
 
 PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                  std::unique_ptr<platform::TimestampClock> timestamps, RealClock* real_clock)
-    : options_(options),
+    : kernel_(kernel),
+      options_(options),
       log_(log),
       timestamps_(std::move(timestamps)),
       start_(options.start ? *options.start : timestamps_->read_realtime()),
@@ -51,7 +52,10 @@ int PtpPort::run() {
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
   while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
-  if (real_clock_ != nullptr) real_clock_->stop();
+  if (real_clock_ != nullptr) {
+    real_clock_->stop();
+    if (!failure_) failure_ = real_clock_->refusal();
+  }
   if (failure_) {
     log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
@@ -76,7 +80,7 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
 }
 
 bool PtpPort::open_feed() {
-  auto feed = TimeFeed::open(options_);
+  auto feed = TimeFeed::open(kernel_, options_, log_);
   if (feed) {
     feed_.emplace(std::move(*feed));
   } else {
@@ -94,7 +98,7 @@ void PtpPort::feed_others(const ClockFollower& follower) {
   if (!feed_ || !feed_->is_on()) return;
   const auto reading = timestamps_->read_realtime();
   const FreeRunningTime instant = oscillator_.from_underlying(reading.free_running);
-  feed_->publish(follower, clock().local_at(instant), reading.realtime_ns, log_);
+  feed_->publish(follower, clock().local_at(instant), reading.free_running, reading.realtime_ns);
 }
 
 bool PtpPort::open_management() {

@@ -70,6 +70,10 @@ class PtpPort : private platform::TransportHandler {
   void log_peer_delay(const ptp::PeerDelay& peer_delay);
   /// The reference's timescale, for a real clock and for other programs.
   void set_scale(const ReferenceScale& scale);
+  /// Whether a pair may reach the servo of a real clock.
+  [[nodiscard]] bool admits(const EventPair& pair) {
+    return real_clock_ == nullptr || real_clock_->admits(pair.reference, pair.free_running);
+  }
   /// Tells chrony and the like, if that is wanted.
   void feed_others(const ClockFollower& follower);
   /// Whether anybody needs to know the timescale.
@@ -105,6 +109,7 @@ class PtpPort : private platform::TransportHandler {
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
 
+  platform::Kernel& kernel_;
   PtpOptions options_;
   Log& log_;
   std::unique_ptr<platform::TimestampClock> timestamps_;

@@ -57,7 +57,9 @@ void PtpReceiver::act(const ptp::Action& action) {
     on_pair(emitted->pair);
   } else if (const auto* delay = std::get_if<ptp::EmitPeerDelay>(&action)) {
     follow_scale_change();
-    if (const auto wrong = follower_.on_link_delay(*delay, now(), core().sync_interval())) {
+    ptp::EmitPeerDelay measured = *delay;  // the delay is one, whatever its stamps say of time
+    if (measured.stamps && !admits(measured.stamps->request)) measured.stamps.reset();
+    if (const auto wrong = follower_.on_link_delay(measured, now(), core().sync_interval())) {
       return fail(*wrong);
     }
   } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
@@ -88,6 +90,7 @@ void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
 
 void PtpReceiver::on_pair(const EventPair& pair) {
   follow_scale_change();
+  if (!admits(pair)) return;
   if (const auto wrong = follower_.on_pair(pair, now(), core().sync_interval())) {
     return fail(*wrong);
   }
@@ -126,9 +129,9 @@ void PtpReceiver::housekeeping(FreeRunningTime) {
   }
 }
 
-// Before the next sample: it would be seconds off, and steered.
+// Before the next sample, which would be seconds off. The clock is never stepped for it.
 void PtpReceiver::follow_scale_change() {
-  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_timescale();
+  if (real_clock() != nullptr && real_clock()->take_scale_change()) follower_.on_new_reference();
 }
 
 bool PtpReceiver::log_missing(LogLevel level) {

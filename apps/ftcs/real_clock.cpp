@@ -10,11 +10,6 @@ namespace ftcs::app {
 namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr std::int64_t kSecondsPerDay = 86'400;
-/// A leap that has not come so long after its time does not come any more.
-constexpr std::int64_t kPatienceS = 10;
-/// So long after a leap a reference, or who tells us of it, may still speak of the time before.
-constexpr std::int64_t kLaggardS = 90;
 
 }  // namespace
 
@@ -39,7 +34,7 @@ RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock c
       log_(log),
       clock_(std::move(clock)),
       timer_(kernel),
-      utc_(std::move(utc)),
+      utc_(kernel, log, clock_.device().name(), std::move(utc), clock_.device().is_system()),
       good_rate_(clock_.tracking_rate()) {}
 
 void RealClock::before_wait(std::optional<std::int64_t> at_most_ns) {
@@ -54,39 +49,34 @@ void RealClock::on_wake() {
   (void)clock_.read();  // ends what is due
 }
 
+std::int64_t RealClock::utc_s() const { return kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond; }
+
 void RealClock::set_reference_scale(const ReferenceScale& scale) {
+  utc_.on_announced(scale, utc_s());
+  follow_offset();
+}
+
+void RealClock::set_fixed_scale(int reference_ahead_of_utc_s, int clock_ahead_of_reference_s) {
+  utc_.follower().set_fixed(reference_ahead_of_utc_s);
+  clock_.set_timescale_offset(Duration::from_whole_ns(-clock_ahead_of_reference_s * kNsPerSecond));
+}
+
+bool RealClock::admits(ReferenceTime reference, FreeRunningTime event) {
+  return utc_.admits(reference, event, kernel_.clock_ns(CLOCK_REALTIME));
+}
+
+// The system clock shows UTC. An adapter's shows what its reference does, or TAI by the system
+// clock.
+void RealClock::follow_offset() {
+  const node::UtcFollower& utc = utc_.follower();
+  const bool from_utc = utc_.config().reference_is_utc;
+  if (!utc.known() || (!is_system() && !from_utc)) return;
   const bool first = !std::exchange(scale_known_, true);
-  const ReferenceScale old = std::exchange(scale_, scale);
-  if (!is_system()) return;
-  if (scale.tai && !scale.utc_offset && (first || old.utc_offset)) {
-    log_(LogLevel::kNotice, "{}: the reference does not vouch for its UTC offset; using {} s{}",
-         name(), utc_offset_at(kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond),
-         utc_.leap_seconds ? " of the leap second list" : "");
-  }
-  follow_scale();
-}
-
-int RealClock::utc_offset_at(std::int64_t utc_s) const {
-  if (!utc_.leap_seconds) return utc_.utc_offset;
-  // The clock that is asked is the one to be set: it may show anything.
-  const auto listed =
-      utc_.leap_seconds->at(std::max(utc_s, utc_.leap_seconds->updated().value_or(utc_s)));
-  return listed ? listed->utc_offset : utc_.utc_offset;
-}
-
-void RealClock::follow_scale() {
-  if (!scale_known_) return;
-  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
-  const int offset = !scale_.tai ? 0 : scale_.utc_offset.value_or(utc_offset_at(utc_s));
-  const int now = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
-  const bool first = !std::exchange(scale_followed_, true);
-  if (offset == now) return;
-  if (armed_leap_ != 0 && offset == now + armed_leap_) return;  // the leap itself will bring it
-  if (utc_s < no_leap_before_s_ && offset == now - last_leap_) return;  // not yet told of the leap
-  log_(first ? LogLevel::kInfo : LogLevel::kWarning, "{}: UTC is {} s behind the reference", name(),
-       offset);
+  const std::int64_t offset_s = from_utc ? -utc.utc_offset() : utc.utc_offset();
+  const Duration ahead = Duration::from_whole_ns(offset_s * kNsPerSecond);
+  if (ahead == clock_.timescale_offset()) return;
   scale_changed_ = !first;
-  clock_.set_timescale_offset(Duration::from_whole_ns(offset * kNsPerSecond));
+  clock_.set_timescale_offset(ahead);
 }
 
 std::optional<std::string> RealClock::attend(bool steering, bool locked,
@@ -97,18 +87,21 @@ std::optional<std::string> RealClock::attend(bool steering, bool locked,
   if (raw_s == attended_raw_s_) return std::nullopt;
   attended_raw_s_ = raw_s;
   report_foreign();
-  if (is_system()) {
-    follow_leap(steering);
-    follow_scale();
-    if (steering) publish(locked, servo);
-    if (locked) warn_of_expired_list();  // before, the clock may show anything
+  make_leap_if_due(steering);
+  if (scale_known_) {
+    utc_.on_time(utc_s());
+    const int leap = utc_.follower().expected_leap();
+    if (is_system()) clock_.expect_leap(utc_.config().kernel_leap ? leap : 0);
+    follow_offset();
   }
-  return std::nullopt;
+  if (is_system() && steering) publish(locked, servo);
+  if (is_system() && locked) warn_of_expired_list();  // before, the clock may show anything
+  return utc_.gave_up();
 }
 
 void RealClock::warn_of_expired_list() {
-  if (expiry_said_ || !utc_.leap_seconds || !utc_.leap_seconds->expires()) return;
-  if (kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond <= *utc_.leap_seconds->expires()) return;
+  const std::optional<LeapSeconds>& list = utc_.config().leap_seconds;
+  if (expiry_said_ || !list || !list->expires() || utc_s() <= *list->expires()) return;
   expiry_said_ = true;
   log_(LogLevel::kWarning,
        "{}: the leap second list has expired: a leap second or an offset that only the list would "
@@ -128,71 +121,38 @@ void RealClock::report_foreign() {
          foreign.step->seconds());
   }
   if (foreign.leap != 0) {
-    leap_is_done(foreign.leap);
-    log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
-         foreign.leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
+    utc_.follower().on_leap_done(foreign.leap);
+    say_leap(foreign.leap);
   }
 }
 
-// Announce is believed, and else the list; either on days alone on which leap seconds happen.
-int RealClock::armed_leap(std::int64_t utc_s) const {
-  if (!scale_.tai || utc_s < no_leap_before_s_ || !is_last_day_of_month(utc_s)) return 0;
-  if (scale_.leap != 0) return scale_.leap;
-  // A reference that is a little ahead has leapt already, and tells only the new offset.
-  const auto now = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
-  if (armed_leap_ != 0 && scale_.utc_offset == now + armed_leap_) return armed_leap_;
-  if (!utc_.leap_seconds) return 0;
-  const auto listed = utc_.leap_seconds->at(utc_s);
-  return listed ? listed->leap : 0;
+void RealClock::say_leap(int leap) {
+  log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
+       leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
 }
 
-// An inserted second is the day's last one again, and Announce may go on announcing it for a while.
-void RealClock::leap_is_done(int leap) {
-  armed_leap_ = 0;
-  last_leap_ = leap;
-  no_leap_before_s_ = armed_midnight_s_ + kLaggardS;
-  utc_.utc_offset += leap;
-}
-
-void RealClock::follow_leap(bool steering) {
-  const std::int64_t utc_s = kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
-  // One that we make ourselves is late by a turn of the loop at most.
-  const bool ours_is_due = !utc_.kernel_leap && armed_leap_ != 0 && steering &&
-                           utc_s >= armed_midnight_s_ - (armed_leap_ < 0 ? 1 : 0);
-  if (ours_is_due) {
-    const int leap = armed_leap_;
-    leap_is_done(leap);
-    if (const auto error = clock_.leap_now(leap)) {
-      log_(LogLevel::kError, "leap second: {}", describe(name(), *error));
-    } else {
-      log_(LogLevel::kNotice, "{}: leap second {}; TAI - UTC is {:.0f} s", name(),
-           leap > 0 ? "inserted" : "left out", clock_.timescale_offset().seconds());
-    }
-    return;
-  }
-  const int leap = armed_leap(utc_s);
-  if (leap == armed_leap_) return;
-  // In the last second the kernel is already about to leap: too late to think again.
-  const bool is_happening =
-      utc_s >= armed_midnight_s_ - 1 && utc_s < armed_midnight_s_ + kPatienceS;
-  if (armed_leap_ != 0 && leap == 0 && is_happening) return;
-  armed_leap_ = leap;
-  armed_midnight_s_ = (utc_s / kSecondsPerDay + 1) * kSecondsPerDay;
-  clock_.expect_leap(utc_.kernel_leap ? leap : 0);
-  if (leap != 0) {
-    log_(LogLevel::kNotice, "{}: a leap second will be {} at the end of this UTC day", name(),
-         leap > 0 ? "inserted" : "left out");
+// One that we make ourselves is late by a turn of the loop at most.
+void RealClock::make_leap_if_due(bool steering) {
+  const int leap = utc_.follower().expected_leap();
+  if (!is_system() || utc_.config().kernel_leap || leap == 0 || !steering) return;
+  if (utc_s() < utc_.follower().leap_due_s() - (leap < 0 ? 1 : 0)) return;
+  utc_.follower().on_leap_done(leap);
+  if (const auto error = clock_.leap_now(leap)) {
+    log_(LogLevel::kError, "leap second: {}", describe(name(), *error));
+  } else {
+    say_leap(leap);
   }
 }
 
 void RealClock::publish(bool locked, const ServoSnapshot& servo) {
   platform::TimeStatus status;
   status.synchronised = locked;
-  status.leap = utc_.kernel_leap ? armed_leap_ : 0;
+  const node::UtcFollower& utc = utc_.follower();
+  const int leap = utc.expected_leap();
+  status.leap = utc_.config().kernel_leap ? leap : 0;
   // In the second of the leap the kernel changes TAI - UTC itself.
-  const bool leaping =
-      armed_leap_ != 0 && kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond >= armed_midnight_s_ - 1;
-  if (scale_.tai && scale_known_ && !leaping) {
+  const bool leaping = leap != 0 && utc_s() >= utc.leap_due_s() - 1;
+  if (utc.is_tai() && scale_known_ && !leaping) {
     status.tai_offset = static_cast<int>(clock_.timescale_offset().rounded_ns() / kNsPerSecond);
   }
   const double sigma_ns = std::isfinite(servo.offset_sigma_ns) ? servo.offset_sigma_ns : 0.0;

@@ -6,28 +6,14 @@
 #include <string>
 #include <utility>
 
-#include "apps/ftcs/leap_seconds.h"
 #include "apps/ftcs/log.h"
+#include "apps/ftcs/utc_watch.h"
 #include "ftcs/platform/kernel_clock.h"
 #include "ftcs/platform/kernel_time_status.h"
 #include "ftcs/platform/wake_timer.h"
 #include "ftcs/servo/servo.h"
 
 namespace ftcs::app {
-
-/// What the reference says about its timescale.
-struct ReferenceScale {
-  bool tai = true;                  ///< false: whatever it is, it is taken as it stands
-  std::optional<int> utc_offset{};  ///< TAI - UTC, if it vouches for it
-  int leap = 0;                     ///< at the end of this UTC day: +1, -1, 0 none
-};
-
-/// Where UTC comes from when the reference does not tell, and who makes a leap.
-struct UtcConfig {
-  int utc_offset = 37;  ///< TAI - UTC since 2017
-  std::optional<LeapSeconds> leap_seconds{};
-  bool kernel_leap = true;  ///< the kernel makes it (STA_INS, STA_DEL); false: we set the clock
-};
 
 /// A clock of the kernel in an event loop: wakes it to end corrections, follows UTC and leap
 /// seconds, tells the kernel and the user what happens.
@@ -50,11 +36,17 @@ class RealClock {
   /// When wake_descriptor() can be read.
   void on_wake();
 
-  /// Around a leap second the reference may be a little early or late: what it says is weighed
-  /// against both offsets, and again once the leap is over.
+  /// Each announcement of the reference once; what of it is believed: node::UtcFollower.
   void set_reference_scale(const ReferenceScale& scale);
-  /// Has the timescale moved under the servo's feet since the last question, other than by a leap?
+  /// The user said what the reference is ahead of UTC by, and the clock of the reference.
+  void set_fixed_scale(int reference_ahead_of_utc_s, int clock_ahead_of_reference_s);
+  /// Whether a reading of the reference may steer; no message must reach the servo without.
+  /// `event`: the same instant on the clock's free-running face.
+  [[nodiscard]] bool admits(ReferenceTime reference, FreeRunningTime event);
+  /// Has local time moved under the servo's feet since the last question, other than by a leap?
   [[nodiscard]] bool take_scale_change() { return std::exchange(scale_changed_, false); }
+  /// Why nothing has been followed so far, if that is why: the run has failed.
+  [[nodiscard]] std::optional<std::string> refusal() const { return utc_.refusal(); }
   /// Once per turn of the loop; returns why the run must end, if it must. `steering`: a command has
   /// been applied, so that the clock is ours to describe.
   [[nodiscard]] std::optional<std::string> attend(bool steering, bool locked,
@@ -66,26 +58,19 @@ class RealClock {
  private:
   void report_foreign();
   void warn_of_expired_list();
-  void follow_scale();
-  [[nodiscard]] int utc_offset_at(std::int64_t utc_s) const;
-  void follow_leap(bool steering);
-  void leap_is_done(int leap);
+  void follow_offset();
+  void make_leap_if_due(bool steering);
+  void say_leap(int leap);
   void publish(bool locked, const ServoSnapshot& servo);
-  [[nodiscard]] int armed_leap(std::int64_t utc_s) const;
+  [[nodiscard]] std::int64_t utc_s() const;
 
   platform::Kernel& kernel_;
   Log& log_;
   platform::KernelClock clock_;
   platform::WakeTimer timer_;
-  UtcConfig utc_;
-  ReferenceScale scale_{};
-  bool scale_known_ = false;
-  bool scale_followed_ = false;
+  UtcWatch utc_;
+  bool scale_known_ = false;  ///< announced, and believed
   bool scale_changed_ = false;
-  int armed_leap_ = 0;
-  std::int64_t armed_midnight_s_ = 0;  ///< UTC: when it is due
-  std::int64_t no_leap_before_s_ = 0;  ///< UTC
-  int last_leap_ = 0;                  ///< the one that no_leap_before_s_ belongs to
   std::int64_t attended_raw_s_ = -1;
   Rate good_rate_;
   bool publish_failed_ = false;

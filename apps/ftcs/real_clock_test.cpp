@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: CLOCK_REALTIME of a fake kernel, 10 s before a UTC midnight, followed by a TAI reference.
+// World: CLOCK_REALTIME of a fake kernel, 30 s before a UTC midnight, followed by a TAI reference
+// that announces its timescale once a second.
 #include "apps/ftcs/real_clock.h"
 
 #include <memory>
@@ -24,16 +25,21 @@ class RealClockTest : public testing::Test {
  protected:
   void start(std::int64_t midnight, bool kernel_leap = true) {
     kernel.system.time_ns =
-        static_cast<double>(midnight * 1'000'000'000 - FakeClocks::kEpoch) - 10 * kSecond;
+        static_cast<double>(midnight * 1'000'000'000 - FakeClocks::kEpoch) - 30 * kSecond;
     UtcConfig utc;
     utc.kernel_leap = kernel_leap;
     auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
     real = std::make_unique<RealClock>(kernel, log, KernelClock(std::move(*device)), utc);
   }
   void steer() { ASSERT_TRUE(real->clock().apply({Rate{}, Duration{}, Rate{}, Duration{}}).ok()); }
+  void announce(const ReferenceScale& scale) {
+    announced = scale;
+    real->set_reference_scale(scale);
+  }
   /// Runs the loop for some seconds; the kernel leaps at midnight if it was asked to.
   void run(int seconds, std::int64_t midnight) {
     for (int i = 0; i < 10 * seconds; ++i) {
+      if (i % 10 == 9) real->set_reference_scale(announced);
       kernel.run(0.1 * kSecond);
       const double since = kernel.system.time_ns -
                            static_cast<double>(midnight * 1'000'000'000 - FakeClocks::kEpoch);
@@ -56,6 +62,7 @@ class RealClockTest : public testing::Test {
   FakeClocks kernel;
   Log log{kernel, stdout, 3};
   std::unique_ptr<RealClock> real;
+  ReferenceScale announced{};
   bool leapt = false;
 };
 
@@ -82,13 +89,27 @@ TEST_F(RealClockTest, leaves_a_rate_behind_that_was_set_while_the_servo_was_lock
 
 TEST_F(RealClockTest, local_time_is_tai_by_the_offset_of_the_reference) {
   start(kNewYear2024);
-  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  announce({.tai = true, .utc_offset = 37});
   const double utc_ns = kernel.system.time_ns;
   EXPECT_NEAR(
       (real->clock().read().local.since_epoch() - Duration::from_whole_ns(FakeClocks::kEpoch)).ns(),
       utc_ns + 37 * kSecond, 1e4);
-  real->set_reference_scale({.tai = false});
-  EXPECT_EQ(real->clock().timescale_offset(), Duration{});
+}
+
+TEST_F(RealClockTest, an_arbitrary_timescale_is_taken_as_it_stands_if_that_is_asked_for) {
+  for (const bool allowed : {true, false}) {
+    kernel.held_names.clear();
+    UtcConfig utc;
+    utc.epoch.any_epoch = allowed;
+    auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+    real = std::make_unique<RealClock>(kernel, log, KernelClock(std::move(*device)), utc);
+    announce({.tai = false, .utc_offset = 37});
+    EXPECT_EQ(real->clock().timescale_offset(), Duration{});
+    const ClockReading now = real->clock().read();
+    EXPECT_EQ(real->admits(ReferenceTime{now.local.since_epoch()}, now.free_running), allowed);
+    EXPECT_EQ(real->refusal().has_value(), !allowed);
+    real.reset();
+  }
 }
 
 TEST_F(RealClockTest, a_leap_of_the_kernel_leaves_local_time_alone) {
@@ -97,12 +118,12 @@ TEST_F(RealClockTest, a_leap_of_the_kernel_leaves_local_time_alone) {
       kernel.held_names.clear();
       leapt = false;
       start(kNewYear2024, kernel_leap);
-      real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = leap});
+      announce({.tai = true, .utc_offset = 37, .leap = leap});
       steer();
       const double ideal = kernel.ideal_ns;
       const double utc = kernel.system.time_ns;
       const ClockReading before = real->clock().read();
-      run(20, kNewYear2024);
+      run(40, kNewYear2024);
       EXPECT_EQ(leapt, kernel_leap);
       EXPECT_NEAR(lost_seconds(ideal, utc), leap, 1e-3);
       EXPECT_NEAR((real->clock().read().local - before.local).ns(), kernel.ideal_ns - ideal, 1e4);
@@ -111,7 +132,7 @@ TEST_F(RealClockTest, a_leap_of_the_kernel_leaves_local_time_alone) {
       EXPECT_EQ(kernel.system.tai, 37 + leap);
       EXPECT_EQ(kernel.system.status & (STA_INS | STA_DEL), 0) << "nothing stays armed";
       // The reference says so a little later, and nothing more happens.
-      real->set_reference_scale({.tai = true, .utc_offset = 37 + leap});
+      announce({.tai = true, .utc_offset = 37 + leap});
       EXPECT_NEAR(lost_seconds(ideal, utc), leap, 1e-3);
     }
   }
@@ -119,13 +140,13 @@ TEST_F(RealClockTest, a_leap_of_the_kernel_leaves_local_time_alone) {
 
 TEST_F(RealClockTest, a_reference_that_is_ahead_of_the_leap_does_not_undo_it) {
   start(kNewYear2024);
-  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  announce({.tai = true, .utc_offset = 37, .leap = 1});
   steer();
-  run(5, kNewYear2024);
+  run(25, kNewYear2024);
   ASSERT_NE(kernel.system.status & STA_INS, 0);
-  real->set_reference_scale({.tai = true, .utc_offset = 38});  // its midnight was a little earlier
+  announce({.tai = true, .utc_offset = 38});  // its midnight was a little earlier
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
-  run(20, kNewYear2024);
+  run(40, kNewYear2024);
   EXPECT_TRUE(leapt) << "it stays armed";
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
   EXPECT_EQ(kernel.system.tai, 38);
@@ -134,15 +155,15 @@ TEST_F(RealClockTest, a_reference_that_is_ahead_of_the_leap_does_not_undo_it) {
 
 TEST_F(RealClockTest, a_reference_that_is_behind_the_leap_does_not_undo_it) {
   start(kNewYear2024);
-  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  announce({.tai = true, .utc_offset = 37, .leap = 1});
   steer();
-  run(20, kNewYear2024);
+  run(40, kNewYear2024);
   ASSERT_TRUE(leapt);
-  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  announce({.tai = true, .utc_offset = 37, .leap = 1});
   run(5, kNewYear2024);
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
   // One that insists is believed in the end, and the servo is told.
-  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  announce({.tai = true, .utc_offset = 37});
   run(120, kNewYear2024);
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
   EXPECT_TRUE(real->take_scale_change());
@@ -150,27 +171,27 @@ TEST_F(RealClockTest, a_reference_that_is_behind_the_leap_does_not_undo_it) {
 
 TEST_F(RealClockTest, a_leap_is_kept_where_the_reference_does_not_vouch_for_its_offset) {
   start(kNewYear2024);
-  real->set_reference_scale({.tai = true, .leap = 1});
+  announce({.tai = true, .leap = 1});
   steer();
-  run(20, kNewYear2024);
+  run(40, kNewYear2024);
   ASSERT_TRUE(leapt);
-  real->set_reference_scale({.tai = true});
+  announce({.tai = true});
   run(120, kNewYear2024);
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{38}}});
 }
 
 TEST_F(RealClockTest, a_leap_flag_on_a_day_without_leap_seconds_is_not_believed) {
   start(kJanuary2nd2024);
-  real->set_reference_scale({.tai = true, .utc_offset = 37, .leap = 1});
+  announce({.tai = true, .utc_offset = 37, .leap = 1});
   steer();
-  run(20, kJanuary2nd2024);
+  run(40, kJanuary2nd2024);
   EXPECT_FALSE(leapt);
   EXPECT_EQ(real->clock().timescale_offset(), Duration{Nanoseconds{std::chrono::seconds{37}}});
 }
 
 TEST_F(RealClockTest, the_kernel_is_told_only_once_the_clock_is_steered) {
   start(kNewYear2024);
-  real->set_reference_scale({.tai = true, .utc_offset = 37});
+  announce({.tai = true, .utc_offset = 37});
   EXPECT_FALSE(real->attend(false, false, {}).has_value());
   EXPECT_EQ(kernel.commands, 0);
   ServoSnapshot servo;

@@ -9,6 +9,8 @@
 namespace ftcs::app {
 namespace {
 
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
 /// How far the steered clock may be from the reference, at one standard deviation: the servo's own
 /// word, or what the perceived offsets scatter since lock.
 double sigma_s(const ClockFollower& follower) {
@@ -28,14 +30,21 @@ ReferenceScale reference_scale(std::uint16_t flags, int utc_offset) {
   return scale;
 }
 
-Result<TimeFeed, std::string> TimeFeed::open(const PtpOptions& options) {
-  TimeFeed feed(options.utc_offset);
+TimeFeed::TimeFeed(platform::Kernel& kernel, Log& log, UtcConfig utc)
+    : kernel_(kernel), log_(log), utc_(kernel, log, "samples for NTP", std::move(utc), true) {}
+
+Result<TimeFeed, std::string> TimeFeed::open(platform::Kernel& kernel, const PtpOptions& options,
+                                             Log& log) {
+  UtcConfig utc;
+  utc.utc_offset = options.utc_offset;
+  utc.epoch = options.epoch;
   const bool wanted = !options.chrony_socket.empty() || options.ntp_shm_unit;
   if (wanted && !options.leap_file.empty()) {
     auto list = LeapSeconds::read_file(options.leap_file);
     if (!list) return list.error();
-    feed.leap_seconds_ = std::move(*list);
+    utc.leap_seconds = std::move(*list);
   }
+  TimeFeed feed(kernel, log, std::move(utc));
   if (!options.chrony_socket.empty()) {
     auto socket = platform::ChronySocket::open(options.chrony_socket);
     if (!socket) return "--chrony-sock: " + socket.error().message();
@@ -49,35 +58,38 @@ Result<TimeFeed, std::string> TimeFeed::open(const PtpOptions& options) {
   return feed;
 }
 
-LeapSeconds::State TimeFeed::utc_at(std::int64_t local_s) const {
-  LeapSeconds::State utc{scale_.tai ? scale_.utc_offset.value_or(utc_offset_) : 0, scale_.leap};
-  if (!scale_.tai || !leap_seconds_) return utc;
-  const auto listed = leap_seconds_->at(local_s - utc.utc_offset);
-  if (!listed) return utc;
-  if (!scale_.utc_offset) utc.utc_offset = listed->utc_offset;
-  if (utc.leap == 0) utc.leap = listed->leap;
-  return utc;
+void TimeFeed::set_scale(const ReferenceScale& scale) {
+  if (!is_on()) return;
+  utc_.on_announced(scale, utc_s_.value_or(kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond));
 }
 
-void TimeFeed::publish(const ClockFollower& follower, LocalTime local, std::int64_t realtime_ns,
-                       Log& log) {
+void TimeFeed::publish(const ClockFollower& follower, LocalTime local, FreeRunningTime event,
+                       std::int64_t realtime_ns) {
   const std::uint64_t used = follower.discipline().counters().used;
   if (!follower.locked() || used == std::exchange(told_, used)) return;
-  const LeapSeconds::State utc = utc_at(local.since_epoch().rounded_ns() / 1'000'000'000);
+  const ReferenceTime reference{local.since_epoch()};
+  if (!utc_.admits(reference, event, realtime_ns)) return;
+  const node::UtcFollower& utc = utc_.follower();
+  utc_s_ = reference.since_epoch().floor_ns() / kNsPerSecond - utc.utc_offset();
+  utc_.on_time(*utc_s_);
   platform::NtpSample sample;
   sample.system_ns = realtime_ns;
-  sample.behind = local.since_epoch() - Duration::from_whole_ns(realtime_ns) -
-                  Duration{std::chrono::seconds{utc.utc_offset}};
-  sample.leap = utc.leap;
+  sample.behind = reference.since_epoch() - Duration::from_whole_ns(realtime_ns) -
+                  Duration{std::chrono::seconds{utc.utc_offset()}};
+  sample.leap = utc.expected_leap();
   sample.sigma_s = sigma_s(follower);
+  send(sample);
+}
+
+void TimeFeed::send(const platform::NtpSample& sample) {
   if (shm_) shm_->write(sample);
   if (!socket_) return;
   const auto error = socket_->send(sample);
   if (error && !refused_) {
-    log(LogLevel::kWarning, "chrony: {} (refclock SOCK of that path in chrony.conf?)",
-        error->message());
+    log_(LogLevel::kWarning, "chrony: {} (refclock SOCK of that path in chrony.conf?)",
+         error->message());
   } else if (!error && refused_) {
-    log(LogLevel::kNotice, "chrony: takes samples again");
+    log_(LogLevel::kNotice, "chrony: takes samples again");
   }
   refused_ = error.has_value();
 }

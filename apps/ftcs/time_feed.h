@@ -5,10 +5,9 @@
 #include <string>
 
 #include "apps/ftcs/clock_follower.h"
-#include "apps/ftcs/leap_seconds.h"
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
-#include "apps/ftcs/real_clock.h"
+#include "apps/ftcs/utc_watch.h"
 #include "ftcs/platform/ntp_feed.h"
 #include "ftcs/platform/timestamp_clock.h"
 
@@ -20,24 +19,27 @@ namespace ftcs::app {
 class TimeFeed {
  public:
   /// The error is one line for the user.
-  [[nodiscard]] static Result<TimeFeed, std::string> open(const PtpOptions& options);
+  [[nodiscard]] static Result<TimeFeed, std::string> open(platform::Kernel& kernel,
+                                                          const PtpOptions& options, Log& log);
 
-  /// The reference's timescale, as soon as it is known.
-  void set_scale(const ReferenceScale& scale) { scale_ = scale; }
-  /// `reading`: CLOCK_REALTIME and, at the same instant, `local`, the steered clock.
-  void publish(const ClockFollower& follower, LocalTime local, std::int64_t realtime_ns, Log& log);
+  /// Each announcement of the reference once; what is not believed of it (node::UtcFollower) is not
+  /// passed on.
+  void set_scale(const ReferenceScale& scale);
+  /// The steered clock, an oscillator that nobody steers and CLOCK_REALTIME at the same instant.
+  void publish(const ClockFollower& follower, LocalTime local, FreeRunningTime event,
+               std::int64_t realtime_ns);
   [[nodiscard]] bool is_on() const { return socket_.has_value() || shm_.has_value(); }
 
  private:
-  explicit TimeFeed(int utc_offset) : utc_offset_(utc_offset) {}
-  /// By what the reference vouches for, else by the list, else by `utc_offset_`.
-  [[nodiscard]] LeapSeconds::State utc_at(std::int64_t local_s) const;
+  TimeFeed(platform::Kernel& kernel, Log& log, UtcConfig utc);
+  void send(const platform::NtpSample& sample);
 
-  int utc_offset_;
-  std::optional<LeapSeconds> leap_seconds_{};
+  platform::Kernel& kernel_;
+  Log& log_;
+  UtcWatch utc_;
+  std::optional<std::int64_t> utc_s_{};  ///< as last published: the system clock may be wrong
   std::optional<platform::ChronySocket> socket_{};
   std::optional<platform::NtpShm> shm_{};
-  ReferenceScale scale_{false};
   std::uint64_t told_ = 0;  ///< samples used so far
   bool refused_ = false;
 };

@@ -20,7 +20,9 @@ namespace ftcs::app {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kStart = 1'795'299'184 * kSecond;
+constexpr std::int64_t kMidnight = 1'798'761'600;  // of 2027: leap seconds end a month
+constexpr std::int64_t kFrom1900 = 2'208'988'800;
+constexpr std::int64_t kStart = (kMidnight - 3'600) * kSecond;
 
 struct Sample {
   double offset_s = 0.0;
@@ -56,7 +58,12 @@ class Feed : public testing::Test {
   }
   void publish(TimeFeed& feed, std::int64_t system_minus_reference) {
     const LocalTime local = clock->local_at(source.now());
-    feed.publish(*follower, local, local.since_epoch().rounded_ns() + system_minus_reference, log);
+    feed.publish(*follower, local, source.now(),
+                 local.since_epoch().rounded_ns() + system_minus_reference);
+  }
+  /// What a transmitter of TAI announces, if `flags` say no more.
+  void announce(TimeFeed& feed, std::uint16_t flags, int utc_offset = 37) {
+    feed.set_scale(reference_scale(ptp::flag::kPtpTimescale | flags, utc_offset));
   }
   std::optional<Sample> read() {
     const auto datagram = reader.receive();
@@ -78,7 +85,7 @@ class Feed : public testing::Test {
 };
 
 TEST_F(Feed, NothingIsSaidBeforeTheLock) {
-  auto feed = TimeFeed::open(options);
+  auto feed = TimeFeed::open(kernel, options, log);
   ASSERT_TRUE(feed.ok());
   EXPECT_TRUE(feed->is_on());
   publish(*feed, 0);
@@ -86,78 +93,97 @@ TEST_F(Feed, NothingIsSaidBeforeTheLock) {
 }
 
 TEST_F(Feed, ASystemClockThatIsBehindHasAPositiveOffsetAndEachSyncIsToldOnce) {
-  auto feed = TimeFeed::open(options);
+  auto feed = TimeFeed::open(kernel, options, log);
   lock();
-  publish(*feed, -2'000'000);
+  announce(*feed, ptp::flag::kUtcOffsetValid);
+  publish(*feed, -37 * kSecond - 2'000'000);
   const auto sample = read();
   ASSERT_TRUE(sample.has_value());
   EXPECT_NEAR(sample->offset_s, 2e-3, 1e-9);
-  publish(*feed, -2'000'000);
+  publish(*feed, -37 * kSecond - 2'000'000);
   EXPECT_FALSE(read().has_value());
   exchange();
-  publish(*feed, 5'000);
+  publish(*feed, -37 * kSecond + 5'000);
   EXPECT_NEAR(read()->offset_s, -5e-6, 1e-9);
 }
 
 TEST_F(Feed, TaiIsBroughtToUtc) {
-  auto feed = TimeFeed::open(options);
+  for (const bool vouched_for : {true, false}) {
+    options.utc_offset = vouched_for ? 37 : 40;
+    auto feed = TimeFeed::open(kernel, options, log);
+    lock();
+    exchange();
+    announce(*feed, vouched_for ? ptp::flag::kUtcOffsetValid : 0);
+    publish(*feed, -options.utc_offset * kSecond);
+    const auto sample = read();
+    ASSERT_TRUE(sample.has_value());
+    EXPECT_NEAR(sample->offset_s, 0.0, 1e-9);
+  }
+}
+
+// One forged Announce: chrony was told of -32,767 s.
+TEST_F(Feed, AnAnnouncedOffsetThatCannotBeTrueIsNotPassedOn) {
+  auto feed = TimeFeed::open(kernel, options, log);
   lock();
-  constexpr std::uint16_t kTai = ptp::flag::kPtpTimescale;
-  feed->set_scale(reference_scale(kTai | ptp::flag::kUtcOffsetValid, 40));
-  publish(*feed, -40 * kSecond);
-  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
+  announce(*feed, ptp::flag::kUtcOffsetValid);
+  for (const int forged : {-32'768, 0, 36, 32'767}) {
+    announce(*feed, ptp::flag::kUtcOffsetValid, forged);
+    exchange();
+    publish(*feed, -37 * kSecond);
+    const auto sample = read();
+    ASSERT_TRUE(sample.has_value());
+    EXPECT_NEAR(sample->offset_s, 0.0, 1e-9) << forged;
+  }
+  feed->set_scale(reference_scale(0, 0));
   exchange();
-  feed->set_scale(reference_scale(kTai, 40));  // not vouched for: utc_offset of the options
   publish(*feed, -37 * kSecond);
-  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
+  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9) << "PTP_TIMESCALE cleared";
+}
+
+TEST_F(Feed, AnArbitraryTimescaleIsPassedOnOnlyIfThatIsAskedFor) {
+  for (const bool allowed : {false, true}) {
+    options.epoch.any_epoch = allowed;
+    auto feed = TimeFeed::open(kernel, options, log);
+    lock();
+    exchange();
+    feed->set_scale(reference_scale(0, 0));  // UTC already
+    publish(*feed, 0);
+    EXPECT_EQ(read().has_value(), allowed);
+  }
+}
+
+TEST_F(Feed, AWrongDateIsNotPassedOn) {
+  auto feed = TimeFeed::open(kernel, options, log);
+  lock();
+  announce(*feed, ptp::flag::kUtcOffsetValid);
+  publish(*feed, 100'000 * kSecond);
+  EXPECT_FALSE(read().has_value()) << "more than a day from the system clock";
 }
 
 TEST_F(Feed, TheLeapSecondListTellsWhatTheReferenceDoesNot) {
   const std::string path = reader.path() + ".list";
-  constexpr std::int64_t kMidnight = 1'795'305'600 + 2'208'988'800;  // of that day, since 1900
-  std::ofstream(path) << 2'272'060'800 << " 33\n" << kMidnight << " 34\n";
+  std::ofstream(path) << 2'272'060'800 << " 33\n" << kMidnight + kFrom1900 << " 34\n";
   options.leap_file = path;
-  auto feed = TimeFeed::open(options);
+  auto feed = TimeFeed::open(kernel, options, log);
   ASSERT_TRUE(feed.ok()) << feed.error();
   lock();
-  constexpr std::uint16_t kTai = ptp::flag::kPtpTimescale;
-  feed->set_scale(reference_scale(kTai, 0));
+  announce(*feed, 0);
   publish(*feed, -33 * kSecond);
   const auto sample = read();
   EXPECT_NEAR(sample->offset_s, 0.0, 1e-9);
   EXPECT_EQ(sample->leap, 1);
-  exchange();
-  feed->set_scale(reference_scale(kTai | ptp::flag::kUtcOffsetValid, 40));  // knows better
-  publish(*feed, -40 * kSecond);
-  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
-  exchange();
-  feed->set_scale(reference_scale(0, 0));  // UTC already
-  publish(*feed, 0);
-  EXPECT_NEAR(read()->offset_s, 0.0, 1e-9);
   std::filesystem::remove(path);
   options.leap_file = path;
-  EXPECT_FALSE(TimeFeed::open(options).ok());
-}
-
-TEST_F(Feed, LeapSecondsAreHandedOn) {
-  auto feed = TimeFeed::open(options);
-  lock();
-  feed->set_scale(reference_scale(ptp::flag::kLeap61, 37));
-  publish(*feed, 0);
-  EXPECT_EQ(read()->leap, 1);
-  exchange();
-  feed->set_scale(reference_scale(ptp::flag::kLeap59, 37));
-  publish(*feed, 0);
-  EXPECT_EQ(read()->leap, 2);
+  EXPECT_FALSE(TimeFeed::open(kernel, options, log).ok());
 }
 
 TEST_F(Feed, WithoutARequestItIsOff) {
   options.chrony_socket.clear();
-  auto feed = TimeFeed::open(options);
+  auto feed = TimeFeed::open(kernel, options, log);
   ASSERT_TRUE(feed.ok());
   EXPECT_FALSE(feed->is_on());
   options.chrony_socket = std::string(300, 'x');
-  EXPECT_FALSE(TimeFeed::open(options).ok());
+  EXPECT_FALSE(TimeFeed::open(kernel, options, log).ok());
 }
 
 }  // namespace

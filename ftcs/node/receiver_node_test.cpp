@@ -185,7 +185,9 @@ TEST_F(Node, a_timescale_told_with_the_transmitter_is_in_force_before_its_first_
   for (int i = 0; i < 3; ++i) sync(kA, i * kInterval);
   between = [this](const ReceiverEvent& event) {
     const auto* action = std::get_if<ptp::Action>(&event);
-    if (action == nullptr || !std::holds_alternative<ptp::TransmitterSelected>(*action)) return;
+    if (action == nullptr) return;
+    const auto* selected = std::get_if<ptp::TransmitterSelected>(action);
+    if (selected == nullptr || !selected->changed) return;
     ServoCommand step;
     step.step = Duration{-37s};
     EXPECT_TRUE(clock->apply(step).ok());

@@ -217,5 +217,13 @@ TEST_F(UtcFollowerTest, what_the_user_fixed_is_not_announced_away) {
   EXPECT_FALSE(utc.refusal().has_value());
 }
 
+TEST(LastDayOfMonth, knows_months_and_leap_years) {
+  constexpr std::int64_t kNewYear2017 = 1'483'228'800;
+  EXPECT_TRUE(is_last_day_of_month(kNewYear2017 - 1));
+  EXPECT_FALSE(is_last_day_of_month(kNewYear2017));
+  EXPECT_TRUE(is_last_day_of_month(951'782'400));   // 29 February 2000
+  EXPECT_FALSE(is_last_day_of_month(951'695'999));  // the end of 27 February 2000
+}
+
 }  // namespace
 }  // namespace ftcs::node

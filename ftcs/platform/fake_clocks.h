@@ -13,7 +13,7 @@ namespace ftcs::platform {
 /// FakeKernel with clocks that can be steered: CLOCK_REALTIME on the oscillator of
 /// CLOCK_MONOTONIC_RAW, /dev/ptp0 and /dev/ptp1 on one of their own each. Rates, steps and leaps
 /// are those of a kernel with infinitely short ticks; `ideal` time is what advance() counts.
-class FakeClocks final : public FakeKernel {
+class FakeClocks : public FakeKernel {
  public:
   struct Clock {
     double time_ns = 0.0;
@@ -37,6 +37,7 @@ class FakeClocks final : public FakeKernel {
   Clock phc;
   Clock other_phc;  ///< /dev/ptp1
   double raw = 1e12;
+  std::int64_t slept_ns = 0;  ///< CLOCK_BOOTTIME - CLOCK_MONOTONIC
   double ideal_ns = 0.0;
   std::int64_t max_adj_ppb = 50'000'000;
   std::int64_t phc_reading_ns = 800;  ///< what it takes to read the hardware clock over the bus
@@ -77,6 +78,7 @@ class FakeClocks final : public FakeKernel {
     last_read = clock;
     if (clock == CLOCK_REALTIME) return kEpoch + std::llround(system.time_ns);
     if (clock == CLOCK_MONOTONIC_RAW || clock == CLOCK_MONOTONIC) return std::llround(raw);
+    if (clock == CLOCK_BOOTTIME) return std::llround(raw) + slept_ns;
     if (phc_gone) return 0;
     run(static_cast<double>(phc_reading_ns) / 2);
     const Clock& read = clock == clock_id_of(kOtherPhcDescriptor) ? other_phc : phc;

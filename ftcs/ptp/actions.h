@@ -81,7 +81,7 @@ struct TransmitterData {
                                    const TransmitterData&) noexcept = default;
 };
 
-/// The best transmitter, when it is selected and whenever what it announces changes.
+/// The best transmitter: when it is selected, and with each of its Announces.
 struct TransmitterSelected {
   TransmitterData transmitter{};
   bool changed = false;  ///< port or grandmaster differ from the last selection: another reference

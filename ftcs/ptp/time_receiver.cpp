@@ -172,12 +172,14 @@ std::optional<Rate> TimeReceiver::grandmaster_rate_ratio() const noexcept {
 }
 
 /// State decision (9.3.3) of a clock that never transmits: follow the best, if there is one.
-void TimeReceiver::decide(FreeRunningTime now, ActionList& actions) noexcept {
+/// True if what it follows, or what that says of itself, is another than before.
+bool TimeReceiver::decide(FreeRunningTime now, ActionList& actions) noexcept {
   const PortIdentity selected = has_transmitter_ ? transmitter_.port : PortIdentity{};
   const bool first_suffices = config_.fast_start && !has_transmitter_;
   const TransmitterData* const best = foreign_.best(selected, now, first_suffices);
-  if (best == nullptr || (has_transmitter_ && *best == transmitter_)) return;
+  if (best == nullptr || (has_transmitter_ && *best == transmitter_)) return false;
   select(*best, now, actions);
+  return true;
 }
 
 void TimeReceiver::select(const TransmitterData& data, FreeRunningTime now,

@@ -134,7 +134,7 @@ class TimeReceiver {
   void on_delay_resp(const Header& header, const DelayResp& response, FreeRunningTime now,
                      ActionList& actions) noexcept;
   void follow_information(const FollowUp& follow_up, ActionList& actions) noexcept;
-  void decide(FreeRunningTime now, ActionList& actions) noexcept;
+  bool decide(FreeRunningTime now, ActionList& actions) noexcept;
   void select(const TransmitterData& data, FreeRunningTime now, ActionList& actions) noexcept;
   void deliver(const EventPair& pair, ActionList& actions) noexcept;
   void lose_transmitter(Counter reason, FreeRunningTime now, ActionList& actions) noexcept;

@@ -112,7 +112,11 @@ void TimeReceiver::on_announce(const Header& header, const Announce& announce, F
   if (heard == ForeignTransmitters::Heard::kTableFull) port_.count(Counter::kForeignTableFull);
   if (heard == ForeignTransmitters::Heard::kNew)
     port_.push(TransmitterSeen{header.source}, actions);
-  decide(now, actions);
+  if (decide(now, actions)) return;
+  // Who believes only what is said again has to hear it again.
+  if (has_transmitter_ && transmitter_.port == header.source) {
+    port_.push(TransmitterSelected{transmitter_, false}, actions);
+  }
 }
 
 void TimeReceiver::on_sync(const Header& header, const Sync& sync, const Input& input,

@@ -27,11 +27,12 @@ pidfile $folder/chronyd.pid
 logdir $folder
 log refclocks tracking
 END
+# ptp4l with software timestamps announces an arbitrary timescale: --allow-epoch.
 # Both in one IPC namespace of their own: the segment goes with it.
 cat > "$folder/both.sh" << END
 chronyd -x -d -u root -f "$folder/chrony.conf" > "$folder/chronyd.log" 2>&1 &
 echo \$! > "$folder/chronyd.child"
-exec "$ftcs" ptp -i "$our_interface" -s -S --offset 1ms --skew 20ppm --chrony-sock "$folder/chrony.sock" --ntp-shm 7 \
+exec "$ftcs" ptp -i "$our_interface" -s -S --offset 1ms --skew 20ppm --allow-epoch --chrony-sock "$folder/chrony.sock" --ntp-shm 7 \
   --uds_address "$folder/ftcs.uds" --summary_interval 2
 END
 ip netns exec "$ours" unshare --ipc bash "$folder/both.sh" > "$folder/receiver.log" 2>&1 &

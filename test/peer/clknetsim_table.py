@@ -151,7 +151,7 @@ def mechanism(scenario, p2p):
 def ftcs(servo, *more, p2p=False):
     def commands(scenario, folder, tools):
         node = [tools["ftcs"], "ptp", "-i", "eth0", "-P" if p2p else "-E", "--servo", servo,
-                *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else []),
+                "--allow-epoch", *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else []),
                 *(f"--{key}={value}" for key, value in mechanism(scenario, p2p).items())]
         return [ptp_transmitter(scenario, folder, tools, mechanism(scenario, p2p)), node]
     return commands
@@ -180,7 +180,7 @@ def chronyd(scenario, folder, tools):
 
 def ftcs_phc(*more):
     def commands(scenario, _folder, tools):
-        return [[tools["ftcs"], "phc", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
+        return [[tools["ftcs"], "phc", "--allow-epoch", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
                  "-F", "0.00002" if scenario.step else "0", *more]]
     return commands
 

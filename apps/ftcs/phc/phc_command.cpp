@@ -8,6 +8,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
+#include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/phc/phc_options.h"
 #include "apps/ftcs/phc/phc_runner.h"
@@ -22,6 +23,7 @@ using Wrong = std::optional<std::string>;
 struct PhcArguments {
   PhcOptions options;
   SteeringArguments steering;
+  EpochArguments epoch;
   std::string law;  ///< -E
   std::optional<double> proportional;
   std::optional<double> integral;
@@ -92,7 +94,8 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
                    "follow the state of a PTP port of this machine; with -r");
   command.add_flag("-r", arguments.system_clock,
                    "-a: the system clock follows the port's clock while that receives time; twice: "
-                   "and leads it while that transmits");
+                   "and leads it while that transmits; with -w twice: a port that transmits will "
+                   "do");
   command.add_flag("-w", options.wait_for_port,
                    "wait until the PTP port is synchronised, and take UTC from it");
   command
@@ -112,6 +115,7 @@ void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
 
 void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
   add_steering_flags(command, arguments.steering);
+  add_epoch_flags(command, arguments.epoch);
   command.add_option("-E,--clock_servo", arguments.law, "pi: as --servo linuxptp-pi")
       ->type_name("NAME");
   command
@@ -232,7 +236,9 @@ Wrong apply_offset(PhcOptions& options) {
 /// -a -r and what does not go with it.
 Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) {
   if (!options.automatic) {
-    return arguments.system_clock > 0 ? Wrong("-r is of -a") : std::nullopt;
+    const bool for_wait = options.wait_for_port && arguments.system_clock > 1;
+    return arguments.system_clock > 0 && !for_wait ? Wrong("-r is of -a, and -r -r of -w")
+                                                   : std::nullopt;
   }
   if (arguments.system_clock == 0) return "-a needs -r: the system clock is what can follow";
   if (options.wait_for_port) return "-a and -w exclude each other";
@@ -250,6 +256,7 @@ Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
   options.system_may_lead = arguments.system_clock > 1;
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
   options.kernel_leap = !arguments.leap_by_us;
+  options.epoch = epoch_rules(arguments.epoch);
   if (auto wrong = apply_offset(options)) return wrong;
   if (auto wrong = apply_servo(arguments, options)) return wrong;
   return apply_steps(arguments, options);

@@ -7,6 +7,7 @@
 
 #include "apps/ftcs/phc/port_watch.h"
 #include "apps/ftcs/steering_arguments.h"
+#include "ftcs/node/epoch_gate.h"
 #include "ftcs/servo/any_servo.h"
 #include "ftcs/time/duration.h"
 
@@ -37,6 +38,7 @@ struct PhcOptions {
   double rate_hz = 1.0;
   ServoConfig servo = phc_servo_defaults();
   SteeringRules steering{};
+  node::EpochRules epoch{};
   bool free_running = false;
   Nanoseconds first_step_threshold{20'000};
   Nanoseconds step_threshold{0};

@@ -37,6 +37,8 @@ DisciplineConfig discipline_config(const PhcOptions& options, bool exact) {
 
 Result<UtcConfig, std::string> utc_config(const PhcOptions& options) {
   UtcConfig utc;
+  utc.epoch = options.epoch;
+  if (options.free_running) utc.epoch = {true, 0, {}, {}, {}};  // comparing alone harms nothing
   utc.kernel_leap = options.kernel_leap;
   if (options.leap_file.empty()) return utc;
   auto list = LeapSeconds::read_file(options.leap_file);
@@ -67,6 +69,7 @@ Result<std::unique_ptr<PhcRunner>, std::string> PhcRunner::open(platform::Kernel
   auto comparison = ClockComparison::make(kernel, *source, *device);
   if (!comparison) return comparison.error();
   const std::string name = device->name();
+  utc->reference_is_utc = source->is_system();
   platform::KernelClock clock(std::move(*device), options.servo.limits, !options.free_running);
   if (const auto error = clock.failure()) return describe(name, *error);
   auto sink = std::make_unique<RealClock>(kernel, log, std::move(clock), std::move(*utc));
@@ -85,8 +88,8 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       discipline_(discipline_config(options, comparison_.is_exact()), sink_->clock()) {
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
   if (options.sink_ahead_s) {
-    sink_->clock().set_timescale_offset(
-        Duration::from_whole_ns(-*options.sink_ahead_s * kNsPerSecond));
+    const int ahead_of_utc = sink_->is_system() ? -*options.sink_ahead_s : UtcConfig{}.utc_offset;
+    sink_->set_fixed_scale(ahead_of_utc, *options.sink_ahead_s);
     return;
   }
   if (options.automatic || options.wait_for_port) return;  // the port will tell
@@ -105,36 +108,36 @@ std::optional<PortWatch> PhcRunner::take_moved_port() {
   return port_moved_ ? std::exchange(watch_, std::nullopt) : std::nullopt;
 }
 
-// A hardware clock that follows the system clock is to show TAI; the other way round RealClock
-// knows what to do.
-void PhcRunner::set_scale(const ReferenceScale& scale) {
-  if (options_.sink_ahead_s) return;
-  if (sink_->is_system()) return sink_->set_reference_scale(scale);
-  if (!source_.is_system()) return;
-  const int ahead = scale.tai ? scale.utc_offset.value_or(UtcConfig{}.utc_offset) : 0;
-  const Duration offset = Duration::from_whole_ns(-ahead * kNsPerSecond);
-  if (offset == sink_->clock().timescale_offset()) return;
-  sink_->clock().set_timescale_offset(offset);
-  if (discipline_.counters().commands == 0) return;
-  log_(LogLevel::kWarning, "{}: the reference is {} s ahead of UTC now", sink_->name(), ahead);
-  discipline_.on_new_timescale();
+void PhcRunner::set_scale() {
+  const PortWatch::Port& port = *watch_->port();
+  if (options_.sink_ahead_s ||
+      std::exchange(scales_heard_, port.scale_answers) == port.scale_answers)
+    return;
+  sink_->set_reference_scale(port.scale);
 }
 
-// Before the next sample: it would be seconds off, and steered.
+// Before the next sample, which would be seconds off. The clock is never stepped for it.
 void PhcRunner::follow_scale_change() {
-  if (sink_->take_scale_change()) discipline_.on_new_timescale();
+  if (sink_->take_scale_change()) discipline_.on_new_reference();
+}
+
+// A port that transmits follows nobody: its adapter's clock may show anything, unless the system
+// clock leads it or was said to.
+bool PhcRunner::port_is_usable() const {
+  if (watch_->is_receiving()) return true;
+  return watch_->is_transmitting() && (source_.is_system() || options_.system_may_lead);
 }
 
 bool PhcRunner::may_follow() {
   if (!watch_) return true;
   watch_->attend(kernel_.clock_ns(CLOCK_MONOTONIC_RAW));
-  bool may = watch_->is_synchronised();
+  bool may = port_is_usable();
   if (pairing_) {
     const auto wanted = pairing(*watch_, options_.system_may_lead);
     may = wanted == pairing_;
     port_moved_ = wanted && !may;
   }
-  if (may) set_scale(watch_->port()->scale);
+  if (may) set_scale();
   if (may == following_) return may;
   following_ = may;
   const std::string_view state =
@@ -176,6 +179,7 @@ int PhcRunner::run() {
     follow_scale_change();
   }
   sink_->stop();
+  if (!failure_) failure_ = sink_->refusal();
   if (failure_) {
     log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
@@ -216,6 +220,10 @@ void PhcRunner::take_sample() {
   reading_failed_ = false;
   const auto instant = sink_->clock().from_stamp(comparison->sink_ns);
   if (!instant) return;  // somebody has just stepped the clock
+  if (!sink_->admits(ReferenceTime::from_ns(comparison->source_ns), *instant)) {
+    (void)discipline_.on_silence();
+    return;
+  }
   // Before the servo acts on it: a step would hide what was seen.
   const Duration offset = offset_from_reference(sink_->clock().local_at(*instant),
                                                 ReferenceTime::from_ns(comparison->source_ns));

@@ -51,7 +51,8 @@ class PhcRunner {
   void wait();
   void follow_scale_change();
   [[nodiscard]] bool may_follow();
-  void set_scale(const ReferenceScale& scale);
+  [[nodiscard]] bool port_is_usable() const;
+  void set_scale();
   void schedule_next();
   void take_sample();
   void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
@@ -70,6 +71,7 @@ class PhcRunner {
   std::optional<Pairing> pairing_;
   bool port_moved_ = false;
   bool following_ = true;
+  std::uint64_t scales_heard_ = 0;
   SampleSummary recent_;
   SampleSummary since_lock_;
   std::int64_t next_raw_ns_ = 0;

@@ -53,11 +53,12 @@ void PortWatch::take(const ptp::ManagementData& data, std::int64_t now_ns) {
     }
   } else if (const auto* time = std::get_if<ptp::TimePropertiesDataSet>(&data)) {
     scale_ = reference_scale(time->flags, time->utc_offset);
+    ++scale_answers_;
   }
   if (!properties_ || !scale_) return;
   answered_ns_ = now_ns;
   port_ = Port{properties_->state, properties_->timestamping != 0,
-               std::string(properties_->interface.view()), *scale_};
+               std::string(properties_->interface.view()), *scale_, scale_answers_};
 }
 
 std::optional<Pairing> pairing(const PortWatch& watch, bool system_may_lead) {

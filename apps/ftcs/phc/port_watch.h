@@ -27,6 +27,7 @@ class PortWatch {
     bool hardware_timestamps = false;
     std::string interface;
     ReferenceScale scale{};
+    std::uint64_t scale_answers = 0;  ///< how often it has told the scale
   };
   /// No value: no complete answer for five seconds.
   [[nodiscard]] const std::optional<Port>& port() const { return port_; }
@@ -37,8 +38,6 @@ class PortWatch {
   [[nodiscard]] bool is_transmitting() const {
     return port_ && port_->state == ptp::PortState::kTimeTransmitter;
   }
-  /// Its clock is the reference or follows one.
-  [[nodiscard]] bool is_synchronised() const { return is_receiving() || is_transmitting(); }
 
  private:
   explicit PortWatch(ManagementClient client) : client_(std::move(client)) {}
@@ -49,6 +48,7 @@ class PortWatch {
   std::optional<Port> port_;
   std::optional<ptp::PortPropertiesNp> properties_;
   std::optional<ReferenceScale> scale_;
+  std::uint64_t scale_answers_ = 0;
   std::optional<std::int64_t> asked_ns_;
   std::int64_t answered_ns_ = 0;
 };
