@@ -3,16 +3,22 @@
 #
 #   ftcs_layer(servo RANK 2 REALTIME SOURCES ... HEADERS ... DEPENDS time measurement LIBRARIES fmt::fmt TESTS a_test.cpp)
 #
-# REALTIME: built without exceptions and RTTI, with a limit on each stack frame.
+# REALTIME: built without exceptions and RTTI, with a limit on each stack frame; a test looks for symbols of an allocator,
+# an exception or a lock in the archive.
 # TESTS: GoogleTest files beside the sources; each file becomes one program named <layer>_<file>.
 function(ftcs_layer name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "REALTIME" "RANK" "SOURCES;HEADERS;DEPENDS;LIBRARIES;TESTS")
   if(arg_SOURCES)
     add_library(ftcs_${name} STATIC ${arg_SOURCES})
     set(scope PUBLIC)
-    target_link_libraries(ftcs_${name} PRIVATE ftcs_warnings)
+    target_link_libraries(ftcs_${name} PRIVATE $<BUILD_INTERFACE:ftcs_warnings>)
     if(arg_REALTIME)
-      target_link_libraries(ftcs_${name} PRIVATE ftcs_realtime)
+      target_link_libraries(ftcs_${name} PRIVATE $<BUILD_INTERFACE:ftcs_realtime>)
+      if(FTCS_BUILD_TESTS AND NOT FTCS_SANITIZE)
+        add_test(NAME realtime_symbols_${name}
+          COMMAND ${PROJECT_SOURCE_DIR}/tools/check-realtime-symbols $<TARGET_FILE:ftcs_${name}>)
+        set_tests_properties(realtime_symbols_${name} PROPERTIES LABELS unit TIMEOUT 30)
+      endif()
       ftcs_use_precompiled(ftcs_${name} realtime)
     else()
       ftcs_use_precompiled(ftcs_${name} hosted)

@@ -8,10 +8,10 @@ namespace ftcs {
 
 /// How a virtual clock starts: at `free_running` it shows `local` and runs at `rate`.
 struct VirtualClockConfig {
-  FreeRunningTime free_running;
-  LocalTime local;
-  Rate rate;
-  RateLimits limits;  ///< of apply(); narrowed to what AffineMap can hold
+  FreeRunningTime free_running{};
+  LocalTime local{};
+  Rate rate{};
+  RateLimits limits{};  ///< of apply(); narrowed to what AffineMap can hold
 };
 
 /// A clock that exists in arithmetic alone: an affine function of a free-running oscillator, paper
