@@ -46,7 +46,7 @@ test-vm: deps-test configure
 	@cmake --build build -j $(JOBS) --target ftcs vm_witness
 	@test/vm/prepare build/vm || { code=$$?; [ $$code -eq 77 ] && exit 0; exit $$code; }
 ifeq ($(JOB),)
-	@ctest --test-dir build -j $(JOBS) --output-on-failure -L '^$(VM_LABEL)$$'
+	@FTCS_VM_FLAGS="$(VM_FLAGS)" ctest --test-dir build -j $(JOBS) --output-on-failure -L '^$(VM_LABEL)$$'
 else
 	@test/vm/run $(VM_FLAGS) $(JOB)
 endif

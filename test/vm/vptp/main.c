@@ -63,6 +63,8 @@ static void remove_all(void)
 	for (i = 0; i < vptp_num_ports; i++)
 		vptp_port_unregister(&vptp_ports[i]);
 	for (i = 0; i < vptp_num_ports; i++)
+		vptp_port_free(&vptp_ports[i]);
+	for (i = 0; i < vptp_num_ports; i++)
 		vptp_pins_stop(&vptp_ports[i].clock);
 	for (i = 0; i < vptp_num_ports; i++)
 		vptp_clock_unregister(&vptp_ports[i].clock);

@@ -62,8 +62,8 @@ static netdev_tx_t start_xmit(struct sk_buff *skb, struct net_device *dev)
 	if (skb_put_padto(skb, ETH_ZLEN))
 		return NETDEV_TX_OK;
 	copy = skb_copy(skb, GFP_ATOMIC);
+	skb_tx_timestamp(skb); /* before it is sent, as in other drivers */
 	ktime_get_snapshot(&sent);
-	skb_tx_timestamp(skb);
 	if (stamps_sent(p, skb) && !vptp_chance(p->lose_tx_permille)) {
 		skb_shinfo(skb)->tx_flags |= SKBTX_IN_PROGRESS;
 		vptp_deliver_tx_stamp(p, skb, ktime_to_ns(sent.raw));
@@ -206,18 +206,21 @@ int vptp_port_register(struct vptp_port *p)
 	eth_hw_addr_set(p->dev, address);
 	netif_carrier_off(p->dev);
 	error = register_netdev(p->dev);
-	if (error) {
-		free_netdev(p->dev);
-		p->dev = NULL;
-	}
+	p->registered = !error;
 	return error;
 }
 
+/* The device goes, its memory stays: the peer may still look at it. */
 void vptp_port_unregister(struct vptp_port *p)
 {
-	if (!p->dev)
-		return;
-	unregister_netdev(p->dev);
-	free_netdev(p->dev);
+	if (p->registered)
+		unregister_netdev(p->dev);
+	p->registered = false;
+}
+
+void vptp_port_free(struct vptp_port *p)
+{
+	if (p->dev)
+		free_netdev(p->dev);
 	p->dev = NULL;
 }

@@ -77,6 +77,7 @@ struct vptp_port {
 	struct kernel_hwtstamp_config config;
 	u64 tx_stamps, rx_stamps;
 	int index;
+	bool registered;
 
 	/* debugfs */
 	u32 delay_ns; /* to the peer */
@@ -126,6 +127,7 @@ void vptp_deliver_tx_stamp(struct vptp_port *p, struct sk_buff *skb, u64 raw);
 /* port.c */
 int vptp_port_register(struct vptp_port *p);
 void vptp_port_unregister(struct vptp_port *p);
+void vptp_port_free(struct vptp_port *p);
 
 /* truth.c */
 void vptp_truth_create(void);
