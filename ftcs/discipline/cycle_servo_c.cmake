@@ -22,7 +22,9 @@ target_compile_definitions(ftcs_cycle_servo_small PUBLIC FTCS_CYCLE_WITHOUT_ADAP
 get_target_property(ftcs_servo_sources ftcs_servo SOURCES)
 list(FILTER ftcs_servo_sources INCLUDE REGEX "^adaptive/.*\\.cpp$")
 list(TRANSFORM ftcs_servo_sources PREPEND ${PROJECT_SOURCE_DIR}/ftcs/servo/)
-ftcs_cycle_library(ftcs_cycle_servo cycle_servo.cpp ${ftcs_servo_sources})
+get_target_property(ftcs_estimation_sources ftcs_estimation SOURCES)
+list(TRANSFORM ftcs_estimation_sources PREPEND ${PROJECT_SOURCE_DIR}/ftcs/estimation/)
+ftcs_cycle_library(ftcs_cycle_servo cycle_servo.cpp ${ftcs_servo_sources} ${ftcs_estimation_sources})
 target_link_libraries(ftcs_cycle_servo PUBLIC m)
 
 if(FTCS_BUILD_TESTS)

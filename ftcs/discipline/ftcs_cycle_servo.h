@@ -109,7 +109,7 @@ typedef struct ftcs_cycle_decision {
 #ifdef FTCS_CYCLE_WITHOUT_ADAPTIVE
 #define FTCS_CYCLE_WORDS 288
 #else
-#define FTCS_CYCLE_WORDS 1664
+#define FTCS_CYCLE_WORDS 2688
 #endif
 /* Storage of one servo; its content is private. May be copied and compared as bytes. */
 typedef struct ftcs_cycle_servo {

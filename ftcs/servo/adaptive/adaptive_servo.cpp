@@ -7,8 +7,8 @@
 namespace ftcs {
 namespace {
 
-using adaptive::Estimate;
-using adaptive::Observation;
+using estimation::Estimate;
+using estimation::Observation;
 
 /// T_c as a part of the sync interval: shorter follows changes more closely (frequency steps of 1
 /// ppm every 50 s: 182 ns at a quarter, 173 at an eighth, 170 at a twelfth), at the price of larger
@@ -21,14 +21,10 @@ constexpr double kLargestOffsetNs = 1099511627776.0;
 /// Cycles without a message: two lost in a row are bad luck, five are an outage.
 constexpr double kSilence = 5.0;
 
-adaptive::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
+estimation::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
   if (!config.fixed_path_delay.has_value()) return {};
   return {static_cast<double>(config.fixed_path_delay->count()),
           static_cast<double>(config.path_delay_sigma.count())};
-}
-
-double sign_of(Direction direction) noexcept {
-  return direction == Direction::kForward ? 1.0 : -1.0;
 }
 
 }  // namespace
@@ -75,7 +71,7 @@ void BasicAdaptiveServo<Grid>::reset() noexcept {
 template <class Grid>
 void BasicAdaptiveServo<Grid>::forget() noexcept {
   estimator_.restart();
-  meter_ = adaptive::IntervalMeter{static_cast<double>(sync_interval_.count())};
+  meter_ = estimation::IntervalMeter{static_cast<double>(sync_interval_.count())};
   started_ = false;
   rate_expected_ = false;
 }
@@ -88,7 +84,7 @@ template <class Grid>
 Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
-  const adaptive::KnownDelay known = estimator_.known_delay();
+  const estimation::KnownDelay known = estimator_.known_delay();
   const double shift = known.known() ? sign * known.mean_ns : 0.0;
   const ReferenceTime event = pair.reference + Duration::from_ns(shift);
   Observation seen;
@@ -127,7 +123,7 @@ bool BasicAdaptiveServo<Grid>::ready() const noexcept {
 template <class Grid>
 ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
                                              const ClockReading& now) noexcept {
-  using Order = adaptive::MessageOrder::Verdict;
+  using Order = estimation::MessageOrder::Verdict;
   const Order order = order_.judge(pair);
   if (order == Order::kDuplicate) return {SampleVerdict::kDuplicate, false, {}};
   if (order == Order::kImplausible) return {SampleVerdict::kImplausible, false, {}};
@@ -206,7 +202,7 @@ ServoSnapshot BasicAdaptiveServo<Grid>::snapshot_at(const ClockReading& now) con
   return describe(belief, belief.cycles > kSilence ? ServoState::kHoldover : state_);
 }
 
-template class BasicAdaptiveServo<adaptive::FullGrid>;
-template class BasicAdaptiveServo<adaptive::SmallGrid>;
+template class BasicAdaptiveServo<estimation::FullGrid>;
+template class BasicAdaptiveServo<estimation::SmallGrid>;
 
 }  // namespace ftcs

@@ -3,14 +3,17 @@
 
 #include <cstddef>
 #include <optional>
+#include <type_traits>
 
-#include "ftcs/servo/adaptive/estimator.h"
-#include "ftcs/servo/adaptive/interval_meter.h"
-#include "ftcs/servo/adaptive/message_order.h"
+#include "ftcs/estimation/estimator.h"
+#include "ftcs/estimation/interval_meter.h"
+#include "ftcs/estimation/load_aware_estimator.h"
+#include "ftcs/estimation/message_order.h"
 #include "ftcs/servo/adaptive/steering.h"
 #include "ftcs/servo/learnt_state.h"
 #include "ftcs/servo/servo.h"
 #include "ftcs/servo/servo_config_error.h"
+#include "ftcs/time/per_direction.h"
 
 namespace ftcs {
 
@@ -51,9 +54,11 @@ class BasicAdaptiveServo {
   [[nodiscard]] ServoSnapshot snapshot_at(const ClockReading& now) const noexcept;
 
  private:
+  using Estimator = std::conditional_t<Grid::kFollowsFloor, estimation::LoadAwareEstimator<Grid>,
+                                       estimation::Estimator<Grid>>;
   void forget() noexcept;
   void rebase() noexcept;
-  [[nodiscard]] adaptive::Observation observe(const TimestampPair& pair) noexcept;
+  [[nodiscard]] estimation::Observation observe(const TimestampPair& pair) noexcept;
   [[nodiscard]] bool ready() const noexcept;
   struct Belief {
     double rate_deviation = 0.0;  ///< y: free running per reference, less one
@@ -65,10 +70,10 @@ class BasicAdaptiveServo {
   [[nodiscard]] ServoSnapshot describe(const Belief& belief, ServoState state) const noexcept;
 
   Nanoseconds sync_interval_;
-  adaptive::Estimator<Grid> estimator_;
+  Estimator estimator_;
   adaptive::Steering steering_;
-  adaptive::IntervalMeter meter_;
-  adaptive::MessageOrder order_{};
+  estimation::IntervalMeter meter_;
+  estimation::MessageOrder order_{};
   Duration base_{};             ///< first z: keeps the states small
   FreeRunningTime previous_{};  ///< of the last message
   ReferenceTime event_{};       ///< reference time to which the last message belongs
@@ -78,12 +83,12 @@ class BasicAdaptiveServo {
   bool rate_expected_ = false;  ///< from an earlier run
 };
 
-using AdaptiveServo = BasicAdaptiveServo<adaptive::FullGrid>;
+using AdaptiveServo = BasicAdaptiveServo<estimation::FullGrid>;
 /// Below 1 KiB, for microcontrollers: half a microsecond a message on a PC core.
-using SmallAdaptiveServo = BasicAdaptiveServo<adaptive::SmallGrid>;
+using SmallAdaptiveServo = BasicAdaptiveServo<estimation::SmallGrid>;
 
-extern template class BasicAdaptiveServo<adaptive::FullGrid>;
-extern template class BasicAdaptiveServo<adaptive::SmallGrid>;
+extern template class BasicAdaptiveServo<estimation::FullGrid>;
+extern template class BasicAdaptiveServo<estimation::SmallGrid>;
 static_assert(ClockServo<AdaptiveServo>);
 static_assert(ClockServo<SmallAdaptiveServo>);
 

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/estimation/lanes.h"
+#include "ftcs/estimation/noise_model.h"
+
+namespace ftcs::estimation {
+
+/// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between the models of a
+/// bank: C_ij = max(0, C_ij + l_j - l_i) for every model j that stands behind i, i.e. is wilder.
+/// Beyond the threshold model i has been overtaken by events and takes over the state of the most
+/// convincing j; this shortens the memory of calm models at once after a change.
+template <class Grid>
+class ChangeDetector {
+ public:
+  static constexpr std::size_t kSize = Grid::kSize;
+  static constexpr std::size_t kNone = kSize;
+  /// All but the wildest.
+  static constexpr std::size_t kRows = kSize - 1;
+
+  /// Bit i: model i may have been overtaken. Only then is take_over(i) worth asking.
+  std::uint32_t add(const std::array<double, kSize>& log_density) noexcept {
+    std::array<float, kWidth> l{};
+    for (std::size_t j = 0; j < kWidth; ++j) {
+      l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
+    }
+    std::uint32_t overtaken = 0;
+    const Quad needed = Quad{} + static_cast<float>(kThreshold);
+    for (std::size_t i = 0; i < kRows; ++i) {
+      const float own = l[i];
+      float* const row = &sums_[kPlace[i]];
+      const auto advance = [row, &l, own](std::size_t j, const Quad& behind) {
+        const Quad sum =
+            larger<Quad>(Quad{}, load<Quad>(row + j) + (load<Quad>(&l[j]) + behind - own));
+        store(row + j, sum);
+        return sum;
+      };
+      std::size_t j = (i + 1) / kFour * kFour;
+      // Nothing of calmer models in the group of four where the wilder ones begin.
+      Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
+      Quad peak{};
+      if (j < kLast) {
+        peak = advance(j, behind);
+        behind = Quad{};
+        for (j += kFour; j < kLast; j += kFour) peak = larger<Quad>(peak, advance(j, behind));
+      }
+      peak = larger<Quad>(peak, advance(kLast, behind));
+      overtaken |= static_cast<std::uint32_t>(any(peak > needed)) << i;
+    }
+    return overtaken;
+  }
+
+  /// The model that overtakes model i after `count` messages, the last of which had
+  /// `log_density`, or kNone. Clears its sums. Without `sudden` nothing that one message shows is
+  /// believed.
+  [[nodiscard]] std::size_t take_over(std::size_t i, double count,
+                                      const std::array<double, kSize>& log_density,
+                                      bool sudden) noexcept {
+    // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
+    const double caution = 1.0 + 16.0 / count;
+    const std::size_t winner = most_convincing(i);
+    if (winner == kNone) return kNone;
+    const double latest = log_density[winner] - log_density[i];
+    if (latest <= 0.0) return kNone;  // what was put off is over
+    const bool abrupt = latest > kAbrupt;
+    const bool alone = static_cast<double>(sum(i, winner)) - latest < kSecond;
+    if (!sudden && (abrupt || winner >= kSudden)) return kNone;
+    const double enough = (alone ? kAlone : kThreshold) * caution;
+    const double needed = abrupt ? enough : std::max(enough, kGradual);
+    if (sum(i, winner) <= static_cast<float>(needed)) return kNone;
+    for (std::size_t j = std::min(first_of(i), kLast); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
+    return winner;
+  }
+
+  /// How far model i is behind the most convincing wilder one, nats.
+  [[nodiscard]] double lead(std::size_t i) const noexcept {
+    const std::size_t winner = most_convincing(i);
+    return winner == kNone ? 0.0 : static_cast<double>(sum(i, winner));
+  }
+
+  void clear() noexcept { sums_ = {}; }
+
+ private:
+  [[nodiscard]] float sum(std::size_t i, std::size_t j) const noexcept {
+    return sums_[kPlace[i] + j];
+  }
+  /// Of the models wilder than i, or kNone if none explains better.
+  [[nodiscard]] std::size_t most_convincing(std::size_t i) const noexcept {
+    std::size_t winner = kNone;
+    float furthest = 0.0F;
+    for (std::size_t j = i + 1; j < kSize; ++j) {
+      if (sum(i, j) > furthest) {
+        furthest = sum(i, j);
+        winner = j;
+      }
+    }
+    return winner;
+  }
+
+  /// Nats. One false alarm per e^9.5 = 13,000 messages and pair of models at most (Wald); measured,
+  /// with what else is asked of a change: one that mattered in two million.
+  static constexpr double kThreshold = 9.5;
+  /// What one message brings a good part of is a change, and must be followed at once; what
+  /// has gathered over many is more often chance, and costs a calm model all that it knew.
+  static constexpr double kAbrupt = 5.0;
+  static constexpr double kGradual = 13.0;
+  /// What one message says alone, without so much from those before, is now and then the far end of
+  /// the noise: five sigma come once in two million.
+  static constexpr double kAlone = 11.0;
+  static constexpr double kSecond = 2.0;
+  static constexpr std::size_t kSudden = Grid::kSudden;
+
+  static constexpr std::size_t kFour = 4;
+  static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
+  static constexpr float kNever = -1e30F;
+  static constexpr std::size_t kLast = kWidth - kFour;  ///< the group of four that is never spared
+  static_assert(kSize <= 32);
+  /// Read from place 4 - n on it spares the first n of a group.
+  static constexpr std::array<float, 2 * kFour> kBehind = {kNever, kNever, kNever, kNever,
+                                                           0.0F,   0.0F,   0.0F,   0.0F};
+  /// A row holds the groups of four from the first that has a wilder model on.
+  [[nodiscard]] static constexpr std::size_t first_of(std::size_t i) noexcept {
+    return (i + 1) / kFour * kFour;
+  }
+  /// sums_[kPlace[i] + j] is C_ij.
+  static constexpr std::array<std::uint16_t, kRows + 1> kPlace = []() constexpr {
+    std::array<std::uint16_t, kRows + 1> place{};
+    std::size_t end = 0;
+    for (std::size_t i = 0; i <= kRows; ++i) {
+      const std::size_t first = first_of(i) < kLast ? first_of(i) : kLast;
+      place[i] = static_cast<std::uint16_t>(end - first);
+      end += kWidth - first;
+    }
+    return place;
+  }
+  ();
+  std::array<float, kPlace[kRows - 1] + kWidth> sums_{};
+};
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/delay_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+namespace {
+
+constexpr double kLn2Pi = 1.8378770664093453;
+/// Beyond this many sigma on the late side the normal part no longer matters.
+constexpr double kFarLate = 8.0;
+/// Below this the quotient of density and distribution needs its asymptotic series.
+constexpr double kFarEarly = -6.0;
+constexpr double kSmallestCurvature = 1e-12;
+
+/// phi(u) / Phi(u), the inverse Mills ratio at -u.
+double hazard(double u) noexcept {
+  if (u < kFarEarly) {
+    // Phi(u) = phi(u)/(-u) (1 - 1/u^2 + 3/u^4 - 15/u^6 + 105/u^8 - ...)
+    const double v = 1.0 / (u * u);
+    return -u / (1.0 - v * (1.0 - v * (3.0 - v * (15.0 - v * 105.0))));
+  }
+  const double phi = quick_exp(-0.5 * u * u - 0.5 * kLn2Pi);
+  return phi / (0.5 * std::erfc(-u * std::numbers::sqrt2 / 2.0));
+}
+
+}  // namespace
+
+Score normal_score(double innovation, double spread) noexcept {
+  return {innovation / spread, 1.0 / spread,
+          -0.5 * (innovation * innovation / spread + quick_log(spread) + kLn2Pi)};
+}
+
+Score late_score(double innovation, double spread, double tail) noexcept {
+  if (spread >= 16.0 * tail * tail) {
+    return normal_score(innovation - tail, spread + tail * tail);
+  }
+  const double sigma = std::sqrt(spread);
+  const double u = (innovation - spread / tail) / sigma;
+  if (u >= kFarLate) {
+    return {1.0 / tail, kSmallestCurvature / spread,
+            -quick_log(tail) + spread / (2.0 * tail * tail) - innovation / tail};
+  }
+  const double lambda = hazard(u);
+  return {1.0 / tail - lambda / sigma, std::max(lambda * (u + lambda), kSmallestCurvature) / spread,
+          -quick_log(tail) - innovation * innovation / (2.0 * spread) - 0.5 * kLn2Pi -
+              quick_log(lambda)};
+}
+
+double standard_late_log_density(double w, double k) noexcept {
+  return late_score(w + k, 1.0 - k * k, k).log_density;
+}
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "ftcs/estimation/lanes.h"
+#include "ftcs/estimation/noise_model.h"
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+
+/// What speaks for each model of a bank, the size s of the noise profiled out:
+///
+///     c_i = W ln(V_i / W) + L_i,   V = sum of s^2 nu^2 / S,  L = sum of ln(S / s^2),  W messages
+///
+/// c_i is minus twice the log-likelihood but for a constant. Messages count by their credit; the
+/// memory grows up to 4,000 of them.
+template <class Grid>
+class Evidence {
+ public:
+  static constexpr std::size_t kSize = Grid::kSize;
+  using Row = std::array<double, kSize>;
+
+  /// `distance`: nu^2 / S of each model, `log_variance`: ln S, `scale`: s.
+  void add(const Row& distance, const Row& log_variance, double credit, double scale) noexcept {
+    const double s2 = scale * scale;
+    const double log_s2 = quick_log(s2);
+    const V limit = V{} + kLimit;
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V square = credit * lesser(load<V>(&distance[i]), limit) * s2;
+      store(&squares_[i], load<V>(&squares_[i]) + square);
+      store(&logs_[i], load<V>(&logs_[i]) + credit * (load<V>(&log_variance[i]) - log_s2));
+    }
+    messages_ += credit;
+    if (messages_ > kMemory) shrink();
+  }
+  void forget() noexcept { *this = Evidence{}; }
+  /// What another bank has heard of the same models, which stand there at places[i].
+  template <class Other>
+  void take_from(const Evidence<Other>& other,
+                 const std::array<std::size_t, kSize>& places) noexcept {
+    messages_ = other.messages_;
+    for (std::size_t i = 0; i < kSize; ++i) {
+      squares_[i] = other.squares_[places[i]];
+      logs_[i] = other.logs_[places[i]];
+    }
+  }
+
+  /// W.
+  [[nodiscard]] double messages() const noexcept { return messages_; }
+  /// V_i / W: the squared noise that model i sees, ns^2. Valid: messages() > 0.
+  [[nodiscard]] double mean_square(std::size_t i) const noexcept { return squares_[i] / messages_; }
+
+  /// Writes the models' weights exp(-c_i / 2), sum one, and returns the heaviest. Valid: messages()
+  /// > 0.
+  [[nodiscard]] std::size_t weigh(Row& weight) const noexcept {
+    Row cost;
+    const double per_message = 1.0 / messages_;
+    const V smallest = V{} + kSmallestSquare;
+    V lowest = V{} + kHighestCost;
+    V place{};  // of the lowest cost in each lane
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V square = larger<V>(load<V>(&squares_[i]) * per_message, smallest);
+      const V c = messages_ * quick_log(square) + load<V>(&logs_[i]) + load<V>(&kPlaceCost[i]);
+      store(&cost[i], c);
+      place = c < lowest ? V{} + static_cast<double>(i) : place;
+      lowest = lesser(lowest, c);
+    }
+    const double best_cost = least(lowest);
+    V sum{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V behind = 0.5 * (load<V>(&cost[i]) - best_cost);
+      V w{};
+      if (least(behind) < kHopeless) w = behind < kHopeless ? quick_exp(V{} - behind) : w;
+      store(&weight[i], w);
+      sum += w;
+    }
+    const double share = 1.0 / total(sum);
+    for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);
+    return lane_of(lowest, place, best_cost);
+  }
+
+ private:
+  template <class Other>
+  friend class Evidence;
+  using V = typename LanesOf<kSize>::Type;
+  static constexpr std::size_t kStep = kLanes<V>;
+
+  [[nodiscard]] static std::size_t lane_of(double, double place, double) noexcept {
+    return static_cast<std::size_t>(place);
+  }
+  [[nodiscard]] static std::size_t lane_of(const Pair& lowest, const Pair& place,
+                                           double best) noexcept {
+    const std::size_t first = static_cast<std::size_t>(place[0]);
+    return lowest[0] == best ? first : static_cast<std::size_t>(place[1]) + 1;
+  }
+  void shrink() noexcept {
+    const double keep = kMemory / messages_;
+    messages_ = kMemory;
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      store(&squares_[i], load<V>(&squares_[i]) * keep);
+      store(&logs_[i], load<V>(&logs_[i]) * keep);
+    }
+  }
+
+  /// One innovation, normalised and squared, counts at most this much.
+  static constexpr double kLimit = 12.0;
+  static constexpr double kMemory = 4000.0;
+  static constexpr double kSmallestSquare = 1e-30;
+  static constexpr double kHighestCost = 1e300;
+  /// Nats; a weight of e^-40 moves nothing.
+  static constexpr double kHopeless = 40.0;
+  /// Twice nats per place behind the starting model: with three messages every model is as likely
+  /// as the next, and the wildest would take the noise for motion. Forgotten after a dozen
+  /// messages.
+  static constexpr double kWildnessCost = 1.0;
+  /// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
+  /// then the calmer of two models that explain the same is the better bet. More than this costs
+  /// oscillators that do wander slowly.
+  static constexpr double kCalmGain = 0.3;
+  /// Twice nats for the one model of a slow wander that is too fast for the five nearly constant
+  /// ones to stand in for it, and whose own neighbours cost 10 to 40 %: against their number.
+  static constexpr double kFavour = 1.7;
+  static constexpr Row kPlaceCost = []() constexpr {
+    Row row{};
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double places = Grid::places_from_start(i);
+      row[i] = (places > 0.0 ? kWildnessCost : kCalmGain) * places;
+      if (i == Grid::kFavoured) row[i] -= kFavour;
+      if (i == 0) row[i] -= Grid::kCalmFavour;
+    }
+    return row;
+  }
+  ();
+
+  Row squares_{};
+  Row logs_{};
+  double messages_ = 0.0;
+};
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/floor_estimator.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "ftcs/estimation/delay_shape.h"
+#include "ftcs/estimation/lanes.h"
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+namespace {
+
+/// Share of messages before the floor. Only a broken stamp, or a clock that changed, makes one.
+constexpr double kEarly = 1e-5;
+constexpr double kLn2Pi = 1.8378770664093453;
+constexpr double kLeastLogDensity = -700.0;
+/// Memories in messages: of the share at the floor, of the same for a load that has just changed,
+/// and of the noise there.
+constexpr double kShareMemory = 400.0;
+constexpr double kRecentMemory = 25.0;
+constexpr double kNoiseMemory = 1000.0;
+/// Before so many the share of the fit is better.
+constexpr double kShareFrom = 20.0;
+constexpr double kLeastShare = 0.002;
+constexpr double kMostShare = 0.995;
+/// A square counts at most so many variances.
+constexpr double kSquareLimit = 60.0;
+/// Three sigma early, squared, and for how many messages it is remembered: late is nothing here.
+constexpr double kPlainlyEarly = 9.0;
+constexpr int kEarlyMemory = 8;
+constexpr double kUnlikely = 0.1;
+/// Nats: none at the floor for so long is no chance (1e-6).
+constexpr double kTooDry = 14.0;
+/// Looks for another floor after an early message, after a dry run, after a jump.
+constexpr int kLooksEarly = 2;
+constexpr int kLooksDry = 1;
+/// Start of the filters that hear the members of a fit once more, in units of its noise.
+constexpr double kWideOffset = 1e4;
+constexpr double kWideRate = 1e2;
+constexpr int kForgottenAfter = 4;
+/// The noise of a line contains what the oscillator did; the filters tell the two apart.
+constexpr double kLeastPart = 0.05;
+constexpr double kMostPart = 1.5;
+
+double log_normal(double distance, double log_variance) noexcept {
+  return -0.5 * (distance + log_variance + kLn2Pi);
+}
+
+}  // namespace
+
+void FloorEstimator::restart() noexcept {
+  locked_ = adopted_ = false;
+  search_.restart();
+}
+
+void FloorEstimator::record(const Observation& seen, double rate) noexcept {
+  adopted_ = false;
+  search_.hear({direction_of(seen), seen.z, 0.0, false, rate}, seen.elapsed);
+}
+
+double FloorEstimator::update(const Observation& seen, double rate) noexcept {
+  adopted_ = false;
+  double credit = 0.0;
+  said_ = 0.0;
+  if (locked_) credit = follow(seen);
+  const double slope = locked_ ? mixed_.y : (search_.has_rate() ? search_.rate() : rate);
+  search_.hear({direction_of(seen), seen.z, said_, credit > 0.5, slope}, seen.elapsed);
+  look();
+  return credit;
+}
+
+double FloorEstimator::follow(const Observation& seen) noexcept {
+  Path& path = paths_[direction_of(seen)];
+  ++count_;
+  if (!bank_.predict(seen.elapsed, best_)) {
+    locked_ = false;
+    return 0.0;
+  }
+  const Bank::Innovations in = judge(seen, path);
+  const double credit = in.credit[best_];
+  said_ = in.log_density[best_];
+  testimony_ = {
+      quick_exp(std::max(log_normal(in.distance[best_], in.log_variance[best_]), kLeastLogDensity)),
+      0.0, path.share, path.recent_share};
+  testimony_.waiting = in.centred[best_] > 0.0
+                           ? path.waits.at(in.centred[best_])
+                           : (1.0 - credit) * quick_exp(std::max(said_, kLeastLogDensity));
+  const double s2 = scale_ * scale_;
+  gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];
+  watch_jumps(seen, path, in);
+  bank_.correct(seen, scale_, in);
+  if (!bank_.healthy() && !bank_.heal(best_)) {
+    locked_ = false;
+    return 0.0;
+  }
+  evidence_.add(in.distance, in.log_variance, credit, scale_);
+  detect_changes(in);
+  learn(path, in);
+  choose();
+  return credit;
+}
+
+/// The density in the head of the class, for all models.
+FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
+                                                        const Path& path) const noexcept {
+  using V = Bank::V;
+  const DelayShape noise{path.variance / (scale_ * scale_), 0.0};
+  Bank::Innovations in = bank_.judge(seen, noise, scale_, {}, false);
+  for (std::size_t i = 0; i < FloorGrid::kSize; i += Bank::kStep) {
+    V other;
+    for (std::size_t lane = 0; lane < Bank::kStep; ++lane) {
+      const double nu = in.centred[i + lane];
+      const double reach = std::max(-nu, 3.0 * std::sqrt(in.variance[i + lane]));
+      other[lane] = nu > 0.0 ? (1.0 - path.share) * path.waits.at(nu) : kEarly / (10.0 * reach);
+    }
+    const V log_density = larger<V>(load<V>(&in.log_density[i]), V{} + kLeastLogDensity);
+    const V normal = path.share * quick_exp(log_density);
+    const V density = normal + other;
+    const V credit = normal / density;
+    store(&in.credit[i], credit);
+    store(&in.log_density[i], quick_log(density));
+    store(&in.slope[i], load<V>(&in.slope[i]) * credit);
+    store(&in.curvature[i], load<V>(&in.curvature[i]) * credit);
+  }
+  return in;
+}
+
+/// The watch has a picture of its own: all that is late is an outlier of any size. What is believed
+/// is asked under the same.
+void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
+                                 const Bank::Innovations& in) noexcept {
+  const OutlierPrior outliers{1.0 - path.share, kEarly};
+  const DelayShape shape{path.variance / (scale_ * scale_), 0.0};
+  const double distance = in.distance[best_];
+  double log_density = log_normal(distance, in.log_variance[best_]);
+  if (distance > 4.0) {
+    const double nu = in.centred[best_];
+    const double size = std::max(std::abs(nu), 3.0 * std::sqrt(in.variance[best_]));
+    const double outlier = (nu > 0.0 ? outliers.late : outliers.early) / (10.0 * size);
+    log_density = quick_log(quick_exp(std::max(log_density, kLeastLogDensity)) + outlier);
+  }
+  jumps_.follow({seen, shape, scale_, outliers, process_, true, true, bank_.estimate(best_),
+                 distance, log_density});
+}
+
+void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
+  const bool early = in.centred[best_] < 0.0;
+  if (early && in.distance[best_] > kPlainlyEarly) {
+    early_ = kEarlyMemory;
+  } else if (early_ > 0) {
+    --early_;
+  }
+  if (early && in.credit[best_] < kUnlikely) search_.alarm(kLooksEarly);
+  const std::uint32_t overtaken = detector_.add(in.log_density);
+  const auto jump = jumps_.judge(detector_.lead(best_));
+  if (jump == JumpWatch::Verdict::kJumped) {
+    bank_.start(jumps_.estimate());
+    detector_.clear();
+    jumps_.clear();
+    search_.alarm(kLooksEarly);
+  }
+  if (jump != JumpWatch::Verdict::kNothing) return;
+  for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    const std::size_t source =
+        detector_.take_over(i, static_cast<double>(count_), in.log_density, early_ > 0);
+    if (source == ChangeDetector<FloorGrid>::kNone) continue;
+    bank_.set(i, bank_.estimate(source));
+  }
+}
+
+void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
+  const double credit = in.credit[best_];
+  const double nu = in.centred[best_];
+  path.heard += 1.0;
+  if (path.heard > kShareFrom) {
+    const double rate = 1.0 / std::min(path.heard, kShareMemory);
+    path.share = std::clamp(path.share + rate * (credit - path.share), kLeastShare, kMostShare);
+  }
+  path.recent_share = std::clamp(path.recent_share + (credit - path.recent_share) / kRecentMemory,
+                                 kLeastShare, kMostShare);
+  if (credit > 0.01) {
+    path.members += credit;
+    const double own = path.variance / in.variance[best_];
+    const double square = std::min(nu * nu, kSquareLimit * in.variance[best_]) * own;
+    path.variance += credit / std::min(path.members, kNoiseMemory) * (square - path.variance);
+  }
+  if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
+  path.dry = credit < kUnlikely ? path.dry - quick_log(1.0 - path.share) : 0.0;
+  if (path.dry > kTooDry) search_.alarm(kLooksDry);
+}
+
+void FloorEstimator::choose() noexcept {
+  const double product = paths_.forward.variance * paths_.backward.variance;
+  scale_ = std::max(least_noise_, std::sqrt(std::sqrt(product)));
+  if (evidence_.messages() > 0.0) best_ = evidence_.weigh(weight_);
+  mixed_ = bank_.mixture(weight_, scale_);
+  process_ = bank_.mean_noise(weight_);
+}
+
+FloorSearch::Rival FloorEstimator::rival() const noexcept {
+  if (!locked_) return {};
+  return {true,
+          mixed_.x,
+          scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
+          mixed_.y,
+          {paths_.forward.share, paths_.backward.share}};
+}
+
+void FloorEstimator::look() noexcept {
+  if (!search_.look(rival(), least_noise_)) return;
+  adopt(search_.found());
+  search_.adopt();
+}
+
+void FloorEstimator::adopt(const FloorFit& fit) noexcept {
+  scale_ = std::max(fit.sigma(), least_noise_);
+  mean_wait_ = fit.noise.forward.mean_wait;
+  certainty_ = fit.evidence;
+  evidence_.forget();
+  detector_.clear();
+  jumps_.clear();
+  weight_.fill(0.0);
+  best_ = FloorGrid::kStart;
+  weight_[best_] = 1.0;
+  hear_members_again(fit);
+  for (const Direction direction : kDirections) {
+    // The earliest of b messages is at the floor with probability 1 - (1 - w)^b.
+    const double entries = 1.0 / static_cast<double>(search_.stride());
+    const double share = 1.0 - std::pow(1.0 - fit.noise[direction].share, entries);
+    Path& path = paths_[direction];
+    path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
+    path.variance = scale_ * scale_;
+    path.members = std::min(fit.members[direction], 10.0);
+    path.heard = path.dry = 0.0;
+    path.waits.start(mean_wait_);
+  }
+  count_ = 8;
+  early_ = 0;
+  locked_ = adopted_ = true;
+  mixed_ = bank_.mixture(weight_, scale_);
+  process_ = bank_.mean_noise(weight_);
+}
+
+/// The line's noise includes what the oscillator did meanwhile. Heard once more, in order, the
+/// messages at the floor tell the two apart.
+void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
+  double last = 0.0;
+  int heard = 0;
+  search_.each_member([&](Direction direction, double time, double z) {
+    if (heard == 0) {
+      Estimate start = fit.estimate;
+      start.x += start.y * time;
+      start.xx = start.dd = kWideOffset;
+      start.yy = kWideRate;
+      start.xy = start.xd = start.yd = 0.0;
+      bank_.start(start);
+      last = time;
+    }
+    (void)bank_.predict(time - last, best_);
+    last = time;
+    const Observation seen{sign_of(direction), 0.0, z};
+    const Bank::Innovations in = bank_.judge(seen, {}, scale_, {}, false);
+    bank_.correct(seen, scale_, in);
+    if (++heard > kForgottenAfter) evidence_.add(in.distance, in.log_variance, 1.0, scale_);
+  });
+  if (heard == 0) {
+    bank_.start(fit.estimate);
+    return;
+  }
+  (void)bank_.predict(-last, best_);
+  if (!(evidence_.messages() > 0.0)) return;
+  best_ = evidence_.weigh(weight_);
+  const double seen = std::sqrt(evidence_.mean_square(best_));
+  scale_ = std::clamp(seen, std::max(least_noise_, kLeastPart * scale_), kMostPart * scale_);
+}
+
+void FloorEstimator::take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
+                               double scale) noexcept {
+  evidence_.take_from(evidence, FloorGrid::kInFull);
+  const double units = scale * scale / (scale_ * scale_);
+  for (std::size_t i = 0; i < FloorGrid::kSize; ++i) {
+    Estimate e = bank.estimate(FloorGrid::kInFull[i]);
+    for (double* variance : {&e.xx, &e.xy, &e.xd, &e.yy, &e.yd, &e.dd}) *variance *= units;
+    bank_.set(i, e);
+  }
+  choose();
+}
+
+double FloorEstimator::noise_ns(Direction direction) const noexcept {
+  return std::sqrt(paths_[direction].variance);
+}
+
+double FloorEstimator::offset_sigma_ns(double cycles) const noexcept {
+  const double h = std::max(0.0, cycles);
+  const double variance = mixed_.xx + 2.0 * h * mixed_.xy + h * h * mixed_.yy +
+                          process_.white_fm * h + process_.random_walk_fm * h * h * h / 3.0;
+  return scale_ * std::sqrt(std::max(variance, 0.0));
+}
+
+double FloorEstimator::rate_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.yy); }
+double FloorEstimator::delay_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.dd); }
+
+void FloorEstimator::rescale_time(double factor) noexcept {
+  bank_.for_each([factor](Estimate& e) { estimation::rescale_time(e, factor); });
+  estimation::rescale_time(mixed_, factor);
+  jumps_.clear();
+  search_.rescale_time(factor);
+}
+
+void FloorEstimator::shift_offset(double shift_ns) noexcept {
+  bank_.for_each([shift_ns](Estimate& e) { e.x += shift_ns; });
+  mixed_.x += shift_ns;
+  jumps_.clear();
+  search_.shift_offset(shift_ns);
+}
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "ftcs/estimation/change_detector.h"
+#include "ftcs/estimation/evidence.h"
+#include "ftcs/estimation/floor_search.h"
+#include "ftcs/estimation/jump_watch.h"
+#include "ftcs/estimation/model_bank.h"
+#include "ftcs/estimation/wait_density.h"
+
+namespace ftcs::estimation {
+
+/// Offset, rate and delay where messages queue: a bank of Kalman filters under a density with an
+/// atom. Of the messages of each direction a share w waits for nothing and is known to r ns; the
+/// others wait, and how long is learnt:
+///
+///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)      nu > 0;    early: e / (10 max(|nu|, 3 sqrt S))
+///     for T credit c = w N / p;   slope c nu / S;   curvature c / S
+///
+/// While w is not tiny this reaches the filter that knows which messages waited: near the floor T
+/// is flat and thin, so that a message there is recognised as soon as the prediction is good. What
+/// it cannot do is begin; the start comes from FloorSearch.
+class FloorEstimator {
+ public:
+  /// What the last message said of this picture.
+  struct Testimony {
+    double at_floor = 0.0;  ///< density of a message that waits for nothing, 1/ns
+    double waiting = 0.0;   ///< of one that waits
+    double share = 0.5;     ///< of messages at the floor in its direction, by a long memory
+    double recent_share = 0.5;
+  };
+
+  void restart() noexcept;
+  void expect_noise_of_at_least(double ns) noexcept { least_noise_ = ns; }
+
+  /// `rate`: ns per cycle, believed elsewhere. Returns the probability that the message was at the
+  /// floor; 0 while none is known.
+  double update(const Observation& seen, double rate) noexcept;
+  /// Only remembers it.
+  void record(const Observation& seen, double rate) noexcept;
+
+  [[nodiscard]] bool locked() const noexcept { return locked_; }
+  /// The last message has made it start from a new floor.
+  [[nodiscard]] bool adopted() const noexcept { return adopted_; }
+  /// Nats that spoke for that floor.
+  [[nodiscard]] double evidence() const noexcept { return certainty_; }
+  /// Others, who have heard every message, say the same of this floor, and know it better.
+  void take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
+                 double scale) noexcept;
+  /// What is followed is not the floor: to be found anew.
+  void unlock() noexcept { locked_ = false; }
+  /// Messages wait, as others see it.
+  void wake() noexcept { search_.wake(); }
+
+  [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
+  [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
+  [[nodiscard]] double scale() const noexcept { return scale_; }
+  [[nodiscard]] double gain() const noexcept { return gain_; }
+  /// ns, of those that wait, when the floor was found.
+  [[nodiscard]] double mean_wait() const noexcept { return mean_wait_; }
+  [[nodiscard]] double noise_ns(Direction direction) const noexcept;
+  [[nodiscard]] double share(Direction direction) const noexcept { return paths_[direction].share; }
+  [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
+  [[nodiscard]] double rate_sigma_ns() const noexcept;
+  [[nodiscard]] double delay_sigma_ns() const noexcept;
+
+  void rescale_time(double factor) noexcept;
+  void shift_offset(double shift_ns) noexcept;
+
+ private:
+  using Bank = ModelBank<FloorGrid>;
+  using Row = Bank::Row;
+
+  /// What is known of one direction.
+  struct Path {
+    double share = 0.5;         ///< w
+    double recent_share = 0.5;  ///< the same by the last two dozen messages
+    double variance = 1.0;      ///< r^2, ns^2
+    double members = 0.0;       ///< messages at the floor behind the variance
+    double heard = 0.0;
+    double dry = 0.0;  ///< nats: how unlikely it is that none of the last was at the floor
+    WaitDensity waits{};
+  };
+
+  double follow(const Observation& seen) noexcept;
+  [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
+  void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;
+  void detect_changes(const Bank::Innovations& in) noexcept;
+  void learn(Path& path, const Bank::Innovations& in) noexcept;
+  void choose() noexcept;
+  void look() noexcept;
+  void adopt(const FloorFit& fit) noexcept;
+  void hear_members_again(const FloorFit& fit) noexcept;
+  [[nodiscard]] FloorSearch::Rival rival() const noexcept;
+
+  Bank bank_{};
+  Evidence<FloorGrid> evidence_{};
+  ChangeDetector<FloorGrid> detector_{};
+  JumpWatch jumps_{};
+  FloorSearch search_{};
+  PerDirection<Path> paths_{};
+  Row weight_{};
+  Testimony testimony_{};
+  Estimate mixed_{};
+  NoiseModel process_{};
+  std::size_t best_ = FloorGrid::kStart;
+  std::uint32_t count_ = 0;
+  double scale_ = 100.0;
+  double least_noise_ = 1e-4;
+  double gain_ = 1.0;
+  double said_ = 0.0;  ///< ln density of the last message
+  double mean_wait_ = 0.0;
+  double certainty_ = 0.0;
+  int early_ = 0;  ///< messages for which an early one is remembered
+  bool locked_ = false;
+  bool adopted_ = false;
+};
+
+}  // namespace ftcs::estimation

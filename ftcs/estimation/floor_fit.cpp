@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/floor_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "ftcs/estimation/line_sums.h"
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+namespace {
+
+/// ln of the range over which a wait of unknown size lies.
+constexpr double kLogRange = 10.0;
+constexpr double kUnknownWaits = 0.1;
+constexpr double kEarly = 1e-4;
+/// Waits of unknown size are even below this part of the mean wait.
+constexpr double kEvenBelow = 0.125;
+constexpr double kFewest = 5.0;
+constexpr std::size_t kCandidates = 48;
+/// Cycles between the two messages of an edge, at least.
+constexpr double kShortestEdge = 0.5;
+/// Within the width of a floor lie so many messages at least, and it is at most this part of the
+/// mean height.
+constexpr double kFewestInside = 6.0;
+constexpr double kWidest = 0.25;
+constexpr int kRounds = 8;
+/// The floor must be this much sharper than the waits are long.
+constexpr double kSharp = 1.0 / 12.0;
+/// Share at the floor in the newest third of a window, at least, as part of that in all of it: a
+/// path that changed leaves its old floor behind.
+constexpr double kLasting = 0.3;
+constexpr double kFewestMembers = 3.0;
+constexpr double kClear = 0.75;
+constexpr double kRootTwoPi = 2.5066282746310002;
+constexpr double kSmallest = 1e-3;
+
+using Windows = PerDirection<RecordWindow>;
+
+/// One candidate: the lines that touch both directions from below at one rate.
+struct Candidate {
+  double rate = 0.0;
+  double score = -1e300;
+  double width = 0.0;
+  double mean = 0.0;  ///< height above the lines
+  PerDirection<double> floor{};
+};
+
+class Fit {
+ public:
+  Fit(const Windows& windows, double least_noise) noexcept
+      : windows_(windows),
+        smallest_(std::max(least_noise, kSmallest)),
+        total_(static_cast<double>(windows.forward.size + windows.backward.size)),
+        base_(windows.forward[windows.forward.size - 1].z) {}
+
+  [[nodiscard]] FloorFit run() noexcept {
+    FloorFit fit;
+    find_candidate();
+    if (!(best_.score > -1e299)) return fit;
+    fit.estimate.y = best_.rate;
+    fit.has_rate = true;
+    start(fit);
+    for (int round = 0; round < kRounds; ++round) {
+      if (!improve(fit)) return fit;
+    }
+    judge(fit);
+    fit.estimate.x += base_;
+    return fit;
+  }
+
+ private:
+  /// Height of a message above sign x + sign y t + d.
+  [[nodiscard]] double height(Direction direction, const RecordedMessage& message, double rate,
+                              double time) const noexcept {
+    return sign_of(direction) * (message.z - base_ - rate * time);
+  }
+
+  void find_candidate() noexcept {
+    for (const Direction direction : kDirections) try_edges(direction);
+  }
+
+  void try_edges(Direction direction) noexcept {
+    const RecordWindow& window = windows_[direction];
+    std::array<std::uint8_t, 128> hull;
+    std::size_t size = 0;
+    const auto slope = [&](std::size_t a, std::size_t b) {
+      const double rise = sign_of(direction) * (window[b].z - window[a].z);
+      return std::array<double, 2>{window.time(window[b]) - window.time(window[a]), rise};
+    };
+    for (std::size_t k = 0; k < window.size; ++k) {
+      while (size >= 2) {
+        const auto edge = slope(hull[size - 2], hull[size - 1]);
+        const auto next = slope(hull[size - 2], k);
+        if (edge[0] * next[1] - edge[1] * next[0] > 0.0) break;
+        --size;
+      }
+      hull[size++] = static_cast<std::uint8_t>(k);
+    }
+    for (std::size_t k = 0; k + 1 < size && tried_ < kCandidates; ++k) {
+      const auto edge = slope(hull[k], hull[k + 1]);
+      if (edge[0] < kShortestEdge) continue;
+      ++tried_;
+      try_rate(sign_of(direction) * edge[1] / edge[0]);
+    }
+  }
+
+  /// Octaves above `smallest_`, the first for all below.
+  static constexpr int kOctaves = 48;
+  using Counts = std::array<std::uint16_t, kOctaves>;
+
+  [[nodiscard]] int octave_of(double height) const noexcept {
+    if (!(height > smallest_)) return 0;
+    const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(height / smallest_) >> 52U);
+    return std::min(kOctaves - 1, exponent - 1022);
+  }
+
+  void try_rate(double rate) noexcept {
+    Candidate candidate;
+    candidate.rate = rate;
+    Counts count{};
+    for (const Direction direction : kDirections) {
+      const RecordWindow& window = windows_[direction];
+      double least = 1e300;
+      for (std::size_t k = 0; k < window.size; ++k) {
+        const RecordedMessage& m = window[k];
+        least = std::min(least, height(direction, m, rate, window.time(m)));
+      }
+      candidate.floor[direction] = least;
+      for (std::size_t k = 0; k < window.size; ++k) {
+        const RecordedMessage& m = window[k];
+        const double above = height(direction, m, rate, window.time(m)) - least;
+        candidate.mean += above / total_;
+        ++count[static_cast<std::size_t>(octave_of(above))];
+      }
+    }
+    score(count, candidate);
+    if (candidate.score > best_.score) best_ = candidate;
+  }
+
+  /// ln likelihood of the best width: `inside` messages evenly within it, the others log-uniform or
+  /// exponential, whichever is likelier.
+  void score(const Counts& count, Candidate& candidate) const noexcept {
+    const double log_unit = quick_log(kLogRange * smallest_);
+    const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
+      return -((static_cast<double>(octave) - 0.5) * quick::kLn2 + log_unit);
+    };
+    double beyond = 0.0;
+    for (int b = 1; b < kOctaves; ++b) beyond += count[static_cast<std::size_t>(b)] * unknown(b);
+    double inside = 0.0;
+    double width = smallest_;
+    for (int b = 0; b < kOctaves; ++b) {
+      const double here = count[static_cast<std::size_t>(b)];
+      inside += here;
+      if (b > 0) {
+        beyond -= here * unknown(b);
+        width *= 2.0;
+      }
+      if (inside < kFewestInside || here == 0.0) continue;
+      if (width > kWidest * candidate.mean && b > 1) break;
+      const double rest = total_ - inside;
+      double likelihood = inside * quick_log(inside / (total_ * width));
+      if (rest > 0.0) {
+        const double mean = candidate.mean * total_ / rest;
+        const double exponential = -rest * (quick_log(mean) + 1.0);
+        likelihood += rest * quick_log(rest / total_) + std::max(beyond, exponential);
+      }
+      if (likelihood > candidate.score) {
+        candidate.score = likelihood;
+        candidate.width = width;
+      }
+    }
+  }
+
+  void start(FloorFit& fit) const noexcept {
+    const double sigma = std::max(smallest_, best_.width / 3.0);
+    const double wait = std::max(best_.mean, smallest_);
+    fit.noise = {{0.5, sigma, wait}, {0.5, sigma, wait}};
+    fit.estimate.x = 0.5 * (best_.floor.forward - best_.floor.backward);
+    fit.estimate.d = 0.5 * (best_.floor.forward + best_.floor.backward) + 1.5 * sigma;
+  }
+
+  [[nodiscard]] double innovation(const FloorFit& fit, Direction direction,
+                                  const RecordedMessage& m, double time) const noexcept {
+    return height(direction, m, fit.estimate.y, time) - sign_of(direction) * fit.estimate.x -
+           fit.estimate.d;
+  }
+
+  /// One round of expectation and maximisation. False: nothing determines the line.
+  [[nodiscard]] bool improve(FloorFit& fit) const noexcept {
+    LineSums sums;
+    double squares = 0.0;  // of z
+    double waited = 0.0;
+    double late = 0.0;
+    for (const Direction direction : kDirections) {
+      const RecordWindow& window = windows_[direction];
+      double members = 0.0;
+      for (std::size_t k = 0; k < window.size; ++k) {
+        const RecordedMessage& m = window[k];
+        const double time = window.time(m);
+        const double nu = innovation(fit, direction, m, time);
+        double density = 0.0;
+        const double credit = fit.noise[direction].at_floor(nu, density);
+        // Relative to the line so far: small numbers, whose squares lose nothing.
+        const double left = sign_of(direction) * nu;
+        sums.add(sign_of(direction), time, left, credit);
+        squares += credit * nu * nu;
+        members += credit;
+        waited += 1.0 - credit;
+        late += (1.0 - credit) * std::max(nu, 0.0);
+      }
+      fit.members[direction] = members;
+      const double share = members / static_cast<double>(window.size);
+      fit.noise[direction].share = std::clamp(share, 0.01, 0.99);
+    }
+    Estimate change;
+    const bool enough =
+        fit.members.forward >= 1.5 && fit.members.backward >= 1.5 && sums.n >= kFewest;
+    if (!enough || !sums.solve(change)) return false;
+    const double explained = change.x * sums.z + change.y * sums.tz + change.d * sums.sz;
+    change.x += fit.estimate.x;
+    change.y += fit.estimate.y;
+    change.d += fit.estimate.d;
+    fit.estimate = change;
+    const double variance = std::max(0.0, squares - explained) / std::max(1.0, sums.n - 3.0);
+    const double sigma = std::max(smallest_, std::sqrt(variance));
+    const double wait =
+        waited > 1.0 ? std::max(late / waited, 8.0 * smallest_) : fit.noise.forward.mean_wait;
+    for (const Direction direction : kDirections) {
+      fit.noise[direction].sigma = sigma;
+      fit.noise[direction].mean_wait = wait;
+    }
+    return true;
+  }
+
+  /// Members, likelihoods and whether all that is asked of a floor holds.
+  void judge(FloorFit& fit) const noexcept {
+    const double wait = fit.noise.forward.mean_wait;
+    const double sigma = fit.sigma();
+    const double chosen = 1.5 * quick_log(std::max(2.718281828459045, wait / sigma));
+    PerDirection<double> speaks{};
+    bool lasting = true;
+    for (const Direction direction : kDirections) {
+      const double gained = judge(fit, direction, lasting);
+      speaks[direction] = gained - chosen;
+    }
+    const bool ahead = fit.clear(Direction::kForward);
+    const bool back = fit.clear(Direction::kBackward);
+    if (ahead == back) {
+      fit.evidence =
+          ahead ? speaks.forward + speaks.backward : std::min(speaks.forward, speaks.backward);
+    } else {
+      fit.evidence = ahead ? speaks.backward : speaks.forward;
+    }
+    fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFewestMembers &&
+                sigma < kSharp * wait;
+  }
+
+  /// Nats by which the floor explains one direction better than waits without one.
+  [[nodiscard]] double judge(FloorFit& fit, Direction direction, bool& lasting) const noexcept {
+    const RecordWindow& window = windows_[direction];
+    const double young = std::min(windows_.forward.time(windows_.forward[0]),
+                                  windows_.backward.time(windows_.backward[0])) /
+                         3.0;
+    FloorNoise without{0.0, smallest_, 0.0};
+    for (std::size_t k = 0; k < window.size; ++k) {
+      without.mean_wait += above_touching_line(direction, window[k]);
+    }
+    without.mean_wait = std::max(without.mean_wait / static_cast<double>(window.size), smallest_);
+    double members = 0.0, recent = 0.0, recent_all = 0.0, gained = 0.0;
+    for (std::size_t k = 0; k < window.size; ++k) {
+      const RecordedMessage& m = window[k];
+      const double time = window.time(m);
+      double with_floor = 0.0;
+      double no_floor = 0.0;
+      const double credit =
+          fit.noise[direction].at_floor(innovation(fit, direction, m, time), with_floor);
+      (void)without.at_floor(std::max(above_touching_line(direction, m), 1e-9), no_floor);
+      const double log_density = quick_log(with_floor);
+      gained += log_density - quick_log(no_floor);
+      fit.log_likelihood += m.said == 0.0F ? 0.0 : log_density;
+      fit.said += static_cast<double>(m.said);
+      members += credit;
+      if (time <= young) continue;
+      recent += credit;
+      recent_all += 1.0;
+    }
+    fit.members[direction] = members;
+    lasting =
+        lasting && recent >= kLasting * recent_all * members / static_cast<double>(window.size);
+    return gained;
+  }
+
+  [[nodiscard]] double above_touching_line(Direction direction,
+                                           const RecordedMessage& m) const noexcept {
+    const double time = windows_[direction].time(m);
+    return height(direction, m, best_.rate, time) - best_.floor[direction];
+  }
+
+  const Windows& windows_;
+  double smallest_;
+  double total_;
+  double base_;
+  std::size_t tried_ = 0;
+  Candidate best_{};
+};
+
+}  // namespace
+
+double FloorNoise::at_floor(double nu, double& density) const noexcept {
+  const double ratio = nu / sigma;
+  const double exponent = std::max(-0.5 * ratio * ratio, -700.0);
+  const double normal = share * quick_exp(exponent) / (sigma * kRootTwoPi);
+  const double size = std::max(std::abs(nu), 3.0 * sigma);
+  double other = kEarly / (kLogRange * size);
+  if (nu > 0.0) {
+    const double exponential = quick_exp(std::max(-nu / mean_wait, -700.0)) / mean_wait;
+    const double unknown = 1.0 / (kLogRange * std::max(size, kEvenBelow * mean_wait));
+    other = (1.0 - share) * ((1.0 - kUnknownWaits) * exponential + kUnknownWaits * unknown);
+  }
+  density = normal + other;
+  return normal / density;
+}
+
+double FloorFit::offset_sigma_ns() const noexcept { return sigma() * std::sqrt(estimate.xx); }
+
+bool FloorFit::clear(Direction direction) const noexcept { return noise[direction].share > kClear; }
+
+FloorFit fit_floor(const PerDirection<RecordWindow>& windows, double least_noise) noexcept {
+  const auto fewest = static_cast<std::size_t>(kFewest);
+  if (std::min(windows.forward.size, windows.backward.size) < fewest) return {};
+  return Fit(windows, least_noise).run();
+}
+
+}  // namespace ftcs::estimation

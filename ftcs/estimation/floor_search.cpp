@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/floor_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+namespace {
+
+/// Messages between two looks at first, and at most.
+constexpr std::uint32_t kShortestPause = 8;
+constexpr std::uint32_t kLongestPause = 256;
+constexpr std::size_t kShortestWindow = 8;
+constexpr std::size_t kFewestEntries = 6;
+constexpr std::size_t kMostStride = 64;
+/// Nats of evidence, after what the choice of the line is worth: e^10 false floors to one.
+constexpr double kCertain = 10.0;
+/// Nats by which it must explain the messages better than filters that follow a floor did; and it
+/// must lie so many sigma off, or know so many times more.
+constexpr double kGain = 20.0;
+constexpr double kOff = 5.0;
+/// An entry should be at the floor more often than not, and seldom twice.
+constexpr double kCoarseBelow = 0.35;
+constexpr double kFineAbove = 1.5;
+
+/// The line, `cycles` later.
+void elapse(Estimate& e, double cycles) noexcept {
+  e.x += e.y * cycles;
+  e.xx += 2.0 * cycles * e.xy + cycles * cycles * e.yy;
+  e.xy += cycles * e.yy;
+  e.xd += cycles * e.yd;
+}
+
+}  // namespace
+
+void FloorSearch::restart() noexcept {
+  record_.clear();
+  recent_.clear();
+  messages_ = not_before_ = 0;
+  pause_ = kShortestPause;
+  alarm_ = 0;
+  wanted_ = best_wanted_ = 0;
+  has_rate_ = fresh_ = clear_ = false;
+  rate_ = 0.0;
+  best_ = {};
+}
+
+void FloorSearch::hear(const Record::Message& message, double elapsed) noexcept {
+  record_.elapse(elapsed);
+  recent_.elapse(elapsed);
+  if (best_wanted_ > 0) elapse(best_.estimate, elapsed);
+  (void)recent_.push({message.direction, message.z, message.said, false, message.rate});
+  fresh_ = record_.push(message) || fresh_;
+  ++messages_;
+}
+
+void FloorSearch::wake() noexcept {
+  pause_ = kShortestPause;
+  not_before_ = std::min(not_before_, messages_ + kShortestPause);
+}
+
+void FloorSearch::alarm(int scans) noexcept { alarm_ = std::max(alarm_, scans); }
+
+std::size_t FloorSearch::stride() const noexcept { return best_in_recent_ ? 1 : record_.stride(); }
+
+PerDirection<RecordWindow> FloorSearch::windows(std::size_t wanted, bool recent) const noexcept {
+  PerDirection<RecordWindow> out;
+  for (const Direction direction : kDirections) {
+    out[direction] = recent ? recent_.window(direction, wanted) : record_.window(direction, wanted);
+  }
+  return out;
+}
+
+void FloorSearch::begin() noexcept {
+  best_wanted_ = 0;
+  scan_has_rate_ = clear_ = false;
+  const bool coarse_due = record_.stride() == 1 || fresh_ || alarm_ > 0;
+  in_recent_ = !coarse_due;
+  wanted_ = kShortestWindow;
+  if (!in_recent_ && record_.stride() > 1) wanted_ = 2 * kShortestWindow;
+  fresh_ = false;
+}
+
+/// True: wanted_ and in_recent_ say which. Windows grow until one holds all there is.
+bool FloorSearch::next_window() noexcept {
+  const std::size_t longest = in_recent_ ? 64 : 128;
+  const std::size_t held =
+      in_recent_ ? std::min(recent_.size(Direction::kForward), recent_.size(Direction::kBackward))
+                 : std::min(record_.size(Direction::kForward), record_.size(Direction::kBackward));
+  if (held >= kFewestEntries && wanted_ <= longest && wanted_ / 2U < held) return true;
+  if (in_recent_ || record_.stride() == 1) return false;
+  in_recent_ = true;
+  wanted_ = kShortestWindow;
+  return next_window();
+}
+
+void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
+  const FloorFit fit = fit_floor(windows(wanted_, in_recent_), least_noise);
+  if (fit.has_rate) {
+    rate_ = fit.estimate.y;
+    has_rate_ = scan_has_rate_ = true;
+  }
+  clear_ = clear_ || (fit.clear(Direction::kForward) && fit.clear(Direction::kBackward));
+  if (!fit.found || fit.evidence < kCertain) return;
+  const double sigma = fit.offset_sigma_ns();
+  if (rival.there) {
+    const double own = rival.offset_sigma * rival.offset_sigma;
+    const double off = fit.estimate.x - rival.offset;
+    const double limit = kOff * kOff;
+    const bool contradicts =
+        off * off > limit * (own + sigma * sigma) || own > limit * sigma * sigma;
+    if (fit.log_likelihood - fit.said < kGain || !contradicts) return;
+  }
+  if (best_wanted_ > 0 && best_.offset_sigma_ns() <= sigma) return;
+  best_ = fit;
+  best_wanted_ = wanted_;
+  best_in_recent_ = in_recent_;
+}
+
+bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
+  if (wanted_ == 0) {
+    const bool due =
+        rival.there ? alarm_ > 0 : messages_ % kShortestPause == 0 && messages_ >= not_before_;
+    if (!due) return false;
+    begin();
+  }
+  // As much as one window of full length, or all the shorter ones.
+  std::size_t work = 0;
+  while (next_window()) {
+    if (work > 0 && work + wanted_ > Record::kCapacity) return false;
+    work += wanted_;
+    fit_window(rival, least_noise);
+    wanted_ = static_cast<std::uint16_t>(2U * wanted_);
+  }
+  end(rival);
+  return best_wanted_ > 0;
+}
+
+void FloorSearch::end(const Rival& rival) noexcept {
+  wanted_ = 0;
+  if (alarm_ > 0) --alarm_;
+  if (best_wanted_ > 0) return;
+  const auto stride = static_cast<double>(record_.stride());
+  if (rival.there) {
+    const double usual = 1.0 / std::min(rival.share.forward, rival.share.backward);
+    if (stride < kCoarseBelow * usual && record_.stride() < kMostStride) {
+      record_.coarsen(rival.rate);
+    } else if (stride > kFineAbove * usual) {
+      record_.refine();
+    }
+    return;
+  }
+  // Nothing found: asked again after twice as long, or when something is late.
+  pause_ = std::min(2U * pause_, kLongestPause);
+  if (messages_ > kLongestPause) not_before_ = messages_ + pause_;
+  if (clear_) {
+    record_.refine();
+  } else if (record_.full() && record_.stride() < kMostStride) {
+    record_.coarsen(rate_);
+  }
+}
+
+void FloorSearch::adopt() noexcept {
+  const Estimate e = best_.estimate;
+  const auto said = [&](Direction direction, double time, double z) {
+    const double nu = sign_of(direction) * (z - e.x - e.y * time) - e.d;
+    double density = 0.0;
+    (void)best_.noise[direction].at_floor(nu, density);
+    return quick_log(density);
+  };
+  record_.say(said);
+  recent_.say(said);
+  best_wanted_ = 0;
+  alarm_ = 0;
+  pause_ = kShortestPause;
+}
+
+void FloorSearch::rescale_time(double factor) noexcept {
+  record_.rescale_time(factor);
+  recent_.rescale_time(factor);
+  rate_ *= factor;
+  wanted_ = best_wanted_ = 0;
+}
+
+void FloorSearch::shift_offset(double shift_ns) noexcept {
+  record_.shift_offset(shift_ns);
+  recent_.shift_offset(shift_ns);
+  best_.estimate.x += shift_ns;
+}
+
+}  // namespace ftcs::estimation

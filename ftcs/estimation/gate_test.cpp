@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// World: messages of two directions that are believed (credit 1) or not (credit 0), late unless
+// said otherwise; thousands of messages after the last change.
+#include "ftcs/estimation/gate.h"
+
+#include <gtest/gtest.h>
+
+namespace ftcs::estimation {
+namespace {
+
+using Verdict = Gate::Verdict;
+constexpr std::uint32_t kLongAgo = 5000;
+
+/// A path on which every message of both directions was believed so far.
+Gate clean_path() {
+  Gate gate;
+  for (int i = 0; i < 400; ++i) {
+    for (const std::size_t side : {0U, 1U}) {
+      gate.learn(side, 1.0);
+      EXPECT_EQ(gate.observe(side, 1.0, false, kLongAgo), Verdict::kShut);
+    }
+  }
+  return gate;
+}
+Verdict reject(Gate& gate, std::size_t side, bool early = false) {
+  gate.learn(side, 0.0);
+  return gate.observe(side, 0.0, early, kLongAgo);
+}
+
+TEST(Gate, opens_for_certain_at_the_sixth_message_where_the_other_direction_fits) {
+  Gate gate = clean_path();
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(reject(gate, 0), Verdict::kShut);
+    EXPECT_EQ(gate.observe(1, 1.0, false, kLongAgo), Verdict::kShut);
+  }
+  EXPECT_EQ(reject(gate, 0), Verdict::kCertain);
+  EXPECT_EQ(reject(gate, 0), Verdict::kShut) << "counts anew";
+}
+
+TEST(Gate, waits_for_eight_where_both_are_late_and_is_never_certain_then) {
+  Gate gate = clean_path();
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(reject(gate, 0), Verdict::kShut);
+    EXPECT_EQ(reject(gate, 1), Verdict::kShut);
+  }
+  EXPECT_EQ(reject(gate, 0), Verdict::kOpen);
+}
+
+TEST(Gate, waits_for_eight_where_outliers_are_frequent) {
+  Gate gate;
+  for (int i = 0; i < 600; ++i) {
+    gate.learn(0, i % 10 == 0 ? 0.0 : 1.0);
+    (void)gate.observe(0, 1.0, false, kLongAgo);
+  }
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(reject(gate, 0), Verdict::kShut) << i;
+  EXPECT_EQ(reject(gate, 0), Verdict::kCertain);
+}
+
+TEST(Gate, opens_when_more_are_refused_than_were_ever_taken) {
+  Gate gate;
+  EXPECT_EQ(reject(gate, 0), Verdict::kShut);
+  EXPECT_EQ(reject(gate, 0), Verdict::kShut);
+  EXPECT_EQ(reject(gate, 0), Verdict::kOpen);
+}
+
+TEST(Gate, tells_when_nothing_is_as_believed) {
+  Gate gate = clean_path();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(reject(gate, 0, true), Verdict::kShut);
+    EXPECT_EQ(reject(gate, 1), Verdict::kShut);
+  }
+  EXPECT_EQ(reject(gate, 0, true), Verdict::kShut);
+  EXPECT_EQ(reject(gate, 1), Verdict::kDiverged);
+}
+
+}  // namespace
+}  // namespace ftcs::estimation

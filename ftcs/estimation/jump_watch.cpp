@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/jump_watch.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ftcs::estimation {
+namespace {
+
+/// An innovation below eight sigma needs no jump; squared.
+constexpr double kFar = 64.0;
+/// ln of the probability that a message brings a jump: one in a thousand. What counts is the
+/// certainty below; a rarer jump needs one more message.
+constexpr double kPrior = -7.0;
+/// Nats. No queue makes packets early, so that two messages, one of each direction, tell a jump of
+/// the offset from anything else. A longer path looks like two late packets, which are common.
+constexpr double kCertainOffset = 13.0;
+constexpr double kCertainDelay = 40.0;
+/// One direction alone: late packets look like a jump of the offset, too.
+constexpr double kCertainAlone = 30.0;
+/// Jump or change of rate? Where messages follow each other closely both explain the same, and only
+/// what is usual remains to decide: oscillators do not change by more than some twenty times the
+/// noise in a cycle, clocks are stepped by anything. A factor of two around that counts six nats.
+constexpr double kUsualRate = 20.0;
+constexpr double kSteepness = 8.0;
+constexpr double kMostPreference = 10.0;
+/// Share of late messages above which one of them says nothing of a jump's size.
+constexpr double kCommon = 0.2;
+/// Cycles since the last message: the rate may have changed well before it.
+constexpr double kUnnoticed = 0.5;
+
+}  // namespace
+
+bool JumpHypothesis::certain() const noexcept {
+  if (!two_way_) return lead_ > kCertainAlone;
+  return lead_ > (jumped_ == Of::kOffset ? kCertainOffset : kCertainDelay) && seen_[0] && seen_[1];
+}
+
+void JumpHypothesis::start(const JumpMessage& message) noexcept {
+  const Estimate& believed = message.believed;
+  const double innovation = message.seen.z - believed.x - message.seen.sign * believed.d;
+  const double size = std::abs(innovation) / message.scale;
+  Estimate jumped = believed;
+  (jumped_ == Of::kOffset ? jumped.xx : jumped.dd) += size * size;
+  filter_.start(jumped);
+  const double rate = size / (std::abs(message.seen.elapsed) + kUnnoticed);
+  preference_ =
+      std::clamp(kSteepness * std::log(rate / kUsualRate), -kMostPreference, kMostPreference);
+  lead_ = kPrior;
+  two_way_ = message.two_way;
+  alive_ = size * size < ModelBank<OneModel>::kLargestVariance;
+}
+
+/// The oscillator wanders as the filters believe that it does.
+void JumpHypothesis::predict(const JumpMessage& message) noexcept {
+  const double t = message.seen.elapsed;
+  const double span = std::abs(t);
+  const double walk = message.process.random_walk_fm;
+  alive_ = filter_.predict(t, 0);
+  filter_.for_each([&](Estimate& e) {
+    e.xx += message.process.white_fm * span + walk * span * span * span / 3.0;
+    e.xy += walk * t * span / 2.0;
+    e.yy += walk * span;
+  });
+}
+
+void JumpHypothesis::judge(const JumpMessage& message) noexcept {
+  const auto said =
+      filter_.judge(message.seen, message.shape, message.scale, message.outliers, true);
+  filter_.correct(message.seen, message.scale, said);
+  lead_ += said.log_density[0] - message.log_density;
+  if (said.credit[0] > 0.5) seen_[message.seen.sign > 0.0 ? 0 : 1] = true;
+  if (!filter_.healthy()) alive_ = false;
+}
+
+/// A jump of the offset makes one direction early; where late messages are common its size is to be
+/// read from that one.
+bool JumpHypothesis::may_start(const JumpMessage& message) const noexcept {
+  if (message.distance < kFar) return false;
+  const Estimate& e = message.believed;
+  const bool early = message.seen.sign * (message.seen.z - e.x) - e.d < 0.0;
+  return early || jumped_ == Of::kDelay || message.outliers.late <= kCommon;
+}
+
+void JumpHypothesis::follow(const JumpMessage& message) noexcept {
+  if (!alive_ && message.distance < kFar) return;  // almost always
+  if (alive_) {
+    predict(message);
+    judge(message);
+  }
+  if (message.distance < kFar) {
+    if (lead_ <= 0.0) alive_ = false;
+  } else if (may_start(message)) {
+    JumpHypothesis afresh(jumped_);
+    afresh.start(message);
+    afresh.judge(message);
+    if (!alive_ || afresh.lead_ > lead_) *this = afresh;
+  }
+  if (!alive_) clear();
+}
+
+void JumpWatch::follow(const JumpMessage& message) noexcept {
+  offset_.follow(message);
+  if (message.delay_free) delay_.follow(message);
+}
+
+JumpWatch::Verdict JumpWatch::judge(double rival) const noexcept {
+  const JumpHypothesis& best = leading();
+  if (!best.alive() || best.lead() <= 0.0 || best.lead() + best.preference() <= rival) {
+    return Verdict::kNothing;
+  }
+  return best.certain() ? Verdict::kJumped : Verdict::kWait;
+}
+
+void JumpWatch::clear() noexcept {
+  offset_.clear();
+  delay_.clear();
+}
+
+}  // namespace ftcs::estimation

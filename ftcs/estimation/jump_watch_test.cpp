@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/jump_watch.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/estimation/lateness.h"
+#include "ftcs/time/timestamp_pair.h"
+
+namespace ftcs::estimation {
+namespace {
+
+using Verdict = JumpWatch::Verdict;
+
+/// A calm filter that knows offset 0, rate 0 and a path of 10 us, with 100 ns of noise; it takes
+/// everything far off for an outlier and keeps its opinion.
+class Calm {
+ public:
+  explicit Calm(bool two_way = true) : two_way_(two_way) {}
+  /// A message `elapsed` cycles after the last one, `z` = x + sign (d + n).
+  Verdict message(Direction direction, double elapsed, double z, double rival = 0.0) {
+    JumpMessage message;
+    message.seen = {direction == Direction::kForward ? 1.0 : -1.0, elapsed, z};
+    message.scale = 100.0;
+    message.outliers = {0.03, 1e-5};
+    message.two_way = message.delay_free = two_way_;
+    message.believed = believed_;
+    const double nu = message.seen.sign * (z - believed_.x) - believed_.d;
+    const double variance = 1e4 * (1.0 + believed_.xx + believed_.dd);
+    message.distance = nu * nu / variance;
+    const Score normal = normal_score(nu, variance);
+    const double outlier = (nu > 0.0 ? 0.03 : 1e-5) / (10.0 * std::abs(nu) + 1.0);
+    message.log_density = std::log(std::exp(normal.log_density) + outlier);
+    watch_.follow(message);
+    return watch_.judge(rival);
+  }
+  Verdict forward(double elapsed, double z) { return message(Direction::kForward, elapsed, z); }
+  Verdict backward(double elapsed, double z) { return message(Direction::kBackward, elapsed, z); }
+  [[nodiscard]] const JumpWatch& watch() const { return watch_; }
+
+ private:
+  Estimate believed_{0.0, 0.0, 10'000.0, 0.01, 0.0, 0.0, 1e-8, 0.0, 0.01};
+  JumpWatch watch_;
+  bool two_way_;
+};
+
+constexpr double kPath = 10'000.0;
+
+TEST(JumpWatch, has_nothing_to_say_of_noise) {
+  Calm calm;
+  EXPECT_EQ(calm.forward(0.5, kPath + 150.0), Verdict::kNothing);
+  EXPECT_EQ(calm.backward(0.5, -kPath - 250.0), Verdict::kNothing);
+}
+
+TEST(JumpWatch, finds_a_jump_of_the_offset_with_one_message_of_each_direction) {
+  Calm calm;
+  EXPECT_NE(calm.forward(0.7, kPath - 20'000.0), Verdict::kJumped);
+  EXPECT_EQ(calm.backward(0.3, -kPath - 20'060.0), Verdict::kJumped);
+  const Estimate jumped = calm.watch().estimate();
+  EXPECT_NEAR(jumped.x, -20'000.0, 100.0);
+  EXPECT_NEAR(jumped.y, 0.0, 1.0);  // the rate is known as before
+  EXPECT_NEAR(jumped.d, kPath, 10.0);
+}
+
+TEST(JumpWatch, needs_both_directions) {
+  Calm calm;
+  for (int i = 0; i < 4; ++i) EXPECT_NE(calm.forward(1.0, kPath - 20'000.0), Verdict::kJumped) << i;
+  EXPECT_EQ(calm.backward(0.1, -kPath - 20'000.0), Verdict::kJumped);
+}
+
+TEST(JumpWatch, asks_more_of_one_direction_where_there_is_no_other) {
+  Calm calm(false);
+  EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
+  EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
+  Verdict last = Verdict::kNothing;
+  for (int i = 0; i < 3 && last != Verdict::kJumped; ++i)
+    last = calm.forward(1.0, kPath + 20'000.0);
+  EXPECT_EQ(last, Verdict::kJumped);
+}
+
+TEST(JumpWatch, waits_for_certainty_of_a_longer_path_and_leaves_the_offset_alone) {
+  Calm calm;
+  EXPECT_NE(calm.forward(0.5, kPath + 15'000.0), Verdict::kJumped);
+  EXPECT_EQ(calm.backward(0.5, -kPath - 15'000.0), Verdict::kWait);
+  EXPECT_NE(calm.forward(0.5, kPath + 15'000.0), Verdict::kJumped);
+  EXPECT_NE(calm.backward(0.5, -kPath - 15'000.0), Verdict::kNothing);
+  Verdict last = Verdict::kNothing;
+  for (int i = 0; i < 2 && last != Verdict::kJumped; ++i)
+    last = calm.forward(0.5, kPath + 15'000.0);
+  EXPECT_EQ(last, Verdict::kJumped);
+  EXPECT_NEAR(calm.watch().estimate().x, 0.0, 30.0);
+  EXPECT_NEAR(calm.watch().estimate().d, kPath + 15'000.0, 150.0);
+}
+
+TEST(JumpWatch, forgets_an_outlier) {
+  Calm calm;
+  (void)calm.forward(0.5, kPath + 100'000.0);
+  EXPECT_EQ(calm.backward(0.5, -kPath), Verdict::kNothing);
+  EXPECT_EQ(calm.forward(0.5, kPath), Verdict::kNothing);
+}
+
+TEST(JumpWatch, leaves_to_a_change_of_rate_what_is_as_usual_for_one) {
+  // 1 us, ten times the noise, within a cycle: one part per million at a second.
+  Calm small;
+  (void)small.message(Direction::kForward, 1.0, kPath - 1'000.0, 5.0);
+  EXPECT_EQ(small.message(Direction::kBackward, 0.01, -kPath - 1'010.0, 25.0), Verdict::kNothing);
+  // 20 us is not, although a rate would explain it as well.
+  Calm large;
+  (void)large.message(Direction::kForward, 1.0, kPath - 20'000.0, 5.0);
+  EXPECT_EQ(large.message(Direction::kBackward, 0.001, -kPath - 20'010.0, 25.0), Verdict::kJumped);
+}
+
+TEST(Lateness, late_in_both_directions_is_no_clock) {
+  Lateness lateness;
+  lateness.observe(0, true, 100.0);
+  EXPECT_TRUE(lateness.speaks_of_clock());
+  lateness.observe(1, true, 100.0);
+  EXPECT_FALSE(lateness.speaks_of_clock());
+  lateness.observe(1, false, 100.0);
+  EXPECT_TRUE(lateness.speaks_of_clock());
+}
+
+TEST(Lateness, is_forgotten_after_eight_messages) {
+  Lateness lateness;
+  lateness.observe(0, true, 100.0);
+  lateness.observe(1, true, 100.0);
+  for (int i = 0; i < 8; ++i) lateness.observe(0, true, 1.0);
+  EXPECT_TRUE(lateness.speaks_of_clock());
+}
+
+}  // namespace
+}  // namespace ftcs::estimation

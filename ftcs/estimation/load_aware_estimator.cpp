@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/load_aware_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ftcs/estimation/quick_math.h"
+
+namespace ftcs::estimation {
+namespace {
+
+/// Nats. One message counts at most kStep; a floor just found leads by what spoke for it, at most
+/// kHeadStart; above kBelieved it is followed until it falls below kDisbelieved, and below -kMost
+/// it is given up.
+constexpr double kStep = 8.0;
+constexpr double kHeadStart = 18.0;
+constexpr double kBelieved = 25.0;
+constexpr double kDisbelieved = -45.0;
+constexpr double kMost = 60.0;
+/// Memory of q, and how near to certainty it may come.
+constexpr double kPartMemory = 20.0;
+constexpr double kLeastPart = 0.02;
+/// A floor that has been out of sight for so long that its offset is known to no more than this
+/// part of the mean wait would take waits for the floor.
+constexpr double kUseful = 1.0 / 16.0;
+/// Sigma of the fit within which the two pictures agree.
+constexpr double kAgree = 3.0;
+/// Four messages that the first picture explains and the second does not, while it is sharp, or two
+/// while it is much sharper; each that both explain takes half a one away, unless they are far
+/// apart.
+constexpr std::uint8_t kExplainedAlone = 8;
+constexpr double kSharp = 4.0;
+constexpr double kFarApart = 0.125;
+constexpr double kLeastLogDensity = -600.0;
+
+}  // namespace
+
+template <class Grid>
+void LoadAwareEstimator<Grid>::forget_floor() noexcept {
+  floor_.restart();
+  lead_ = recent_lead_ = 0.0;
+  believed_ = false;
+}
+
+template <class Grid>
+bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
+  const double noise =
+      std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
+  return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), noise);
+}
+
+/// Both say the same of the offset, and the first picture, which has heard everything, knows it
+/// better than the fit: to believe the floor then moves nothing, and what comes late from now on
+/// will not either.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::agree() const noexcept {
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const double floor = floor_.offset_sigma_ns(0.0);
+  return plain_.offset_sigma_ns(0.0) < floor && apart < kAgree * floor;
+}
+
+/// Where messages wait the first picture is never as sharp as the waits are long, nor as it is
+/// wrong. If it is, and explains what the floor does not, or is much sharper than the floor, the
+/// floor is none.
+template <class Grid>
+void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
+  const double noise =
+      std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const bool contradicts = noise < kFarApart * apart;
+  const bool sharp =
+      contradicts || noise < kSharp * floor_.scale() || noise < kUseful * floor_.mean_wait();
+  const bool sharper = kSharp * noise < floor_.scale();
+  if (!sharp || (own > 0.5 && credit < 0.5)) {
+    explained_alone_ = 0;
+  } else if (credit > 0.5 && (own < 0.5 || sharper)) {
+    explained_alone_ = static_cast<std::uint8_t>(explained_alone_ + (sharper ? 4U : 2U));
+  } else if (own > 0.5 && explained_alone_ > 0 && !contradicts) {
+    --explained_alone_;
+  }
+  if (explained_alone_ >= kExplainedAlone) floor_.unlock();
+}
+
+template <class Grid>
+double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
+  const double credit = plain_.update(seen);
+  if (plain_.count() == 0) {  // it has given up
+    forget_floor();
+    return credit;
+  }
+  if (!plain_.two_way() || plain_.known_delay().known()) {
+    floor_.record(seen, plain_.estimate().y);
+    return credit;
+  }
+  const bool followed = floor_.locked();
+  if (credit < 0.5 && !followed) floor_.wake();
+  const double own = floor_.update(seen, plain_.estimate().y);
+  bool agreed = false;
+  if (floor_.adopted()) {
+    explained_alone_ = 0;
+    agreed = agree();
+    if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
+    if (!believed_) lead_ = recent_lead_ = std::min(floor_.evidence(), kHeadStart);
+  } else if (followed && floor_.locked()) {
+    compare(credit, own);
+  }
+  if (followed && floor_.locked()) follow_lead(direction_of(seen));
+  const double lead = std::max(lead_, recent_lead_);
+  if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
+  const bool convinces = believed_ || agreed || lead > kBelieved;
+  believed_ = floor_.locked() && lead >= kDisbelieved && convinces;
+  return believed_ ? own : credit;
+}
+
+template <class Grid>
+void LoadAwareEstimator<Grid>::follow_lead(Direction direction) noexcept {
+  const FloorEstimator::Testimony& said = floor_.testimony();
+  const double plain = quick_exp(std::max(plain_.log_density(), kLeastLogDensity));
+  double& part = learnt_part_[direction];
+  const double learnt = part * said.waiting;
+  const double waits = learnt + (1.0 - part) * plain;
+  const auto follow = [&](double& lead, double share) {
+    const double density = share * said.at_floor + (1.0 - share) * waits;
+    const double gained = std::clamp(quick_log(density / plain), -kStep, kStep);
+    lead = std::clamp(lead + gained, -kMost, kMost);
+    return (1.0 - share) * waits / density;  // probability that it waited
+  };
+  const double waited = follow(lead_, said.share);
+  (void)follow(recent_lead_, said.recent_share);
+  part += (waited * learnt / waits - part * waited) / kPartMemory;
+  part = std::clamp(part, kLeastPart, 1.0 - kLeastPart);
+}
+
+template class LoadAwareEstimator<FullGrid>;
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "ftcs/estimation/estimator.h"
+#include "ftcs/estimation/floor_estimator.h"
+
+namespace ftcs::estimation {
+
+/// Two pictures of the same path, and the one that predicts better is believed:
+///
+/// - every message is the delay and noise around it, outliers apart (Estimator);
+/// - some messages wait for nothing and all others are late by any amount (FloorEstimator), once a
+///   floor has been found.
+///
+/// The choice is a cumulative sum (Page) of ln [(w N + (1 - w)(q T + (1 - q) p)) / p] over the
+/// messages, p the density by the first picture, q the part of the waits that the learnt T explains
+/// better than p does: whether there is a floor where the second picture says is tested *beside*
+/// whatever the first predicts, so that the shapes of tails do not decide. w by a long and by a
+/// short memory, the better one: a load that changes must not cost the floor.
+template <class Grid>
+class LoadAwareEstimator {
+ public:
+  explicit LoadAwareEstimator(const KnownDelay& delay = {}) noexcept : plain_(delay) {}
+  void restart() noexcept {
+    plain_.restart();
+    forget_floor();
+  }
+  void expect(const RatePrior& rate, double noise_ns) noexcept { plain_.expect(rate, noise_ns); }
+  void expect_noise_of_at_least(double noise_ns) noexcept {
+    plain_.expect_noise_of_at_least(noise_ns);
+    floor_.expect_noise_of_at_least(noise_ns);
+  }
+  void free_delay(double sigma_ns) noexcept { plain_.free_delay(sigma_ns); }
+  void fix_delay() noexcept { plain_.fix_delay(); }
+
+  /// Returns the probability that the message is no outlier.
+  double update(const Observation& seen) noexcept;
+
+  /// The floor is followed.
+  [[nodiscard]] bool follows_floor() const noexcept { return believed_; }
+  [[nodiscard]] const Estimate& estimate() const noexcept {
+    return believed_ ? floor_.estimate() : plain_.estimate();
+  }
+  [[nodiscard]] double scale() const noexcept {
+    return believed_ ? floor_.scale() : plain_.scale();
+  }
+  [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept {
+    return believed_ ? floor_.offset_sigma_ns(cycles) : plain_.offset_sigma_ns(cycles);
+  }
+  [[nodiscard]] double rate_sigma_ns() const noexcept {
+    return believed_ ? floor_.rate_sigma_ns() : plain_.rate_sigma_ns();
+  }
+  [[nodiscard]] double delay_sigma_ns() const noexcept {
+    return believed_ ? floor_.delay_sigma_ns() : plain_.delay_sigma_ns();
+  }
+  [[nodiscard]] double noise_ns(Direction direction) const noexcept {
+    return believed_ ? floor_.noise_ns(direction) : plain_.noise_ns(direction);
+  }
+  [[nodiscard]] double gain() const noexcept { return believed_ ? floor_.gain() : plain_.gain(); }
+  [[nodiscard]] KnownDelay known_delay() const noexcept { return plain_.known_delay(); }
+  [[nodiscard]] bool two_way() const noexcept { return plain_.two_way(); }
+  [[nodiscard]] std::uint32_t count() const noexcept { return plain_.count(); }
+  void rescale_time(double factor) noexcept {
+    plain_.rescale_time(factor);
+    floor_.rescale_time(factor);
+  }
+  void shift_offset(double shift_ns) noexcept {
+    plain_.shift_offset(shift_ns);
+    floor_.shift_offset(shift_ns);
+  }
+
+ private:
+  void forget_floor() noexcept;
+  [[nodiscard]] bool knows_enough() const noexcept;
+  [[nodiscard]] bool agree() const noexcept;
+  void compare(double credit, double own) noexcept;
+  void follow_lead(Direction direction) noexcept;
+
+  Estimator<Grid> plain_;
+  FloorEstimator floor_{};
+  double lead_ = 0.0;                           ///< nats, w by its long memory
+  double recent_lead_ = 0.0;                    ///< by its short one
+  PerDirection<double> learnt_part_{0.5, 0.5};  ///< q
+  std::uint8_t explained_alone_ = 0;  ///< messages that the first picture explains, not the second
+  bool believed_ = false;
+};
+
+extern template class LoadAwareEstimator<FullGrid>;
+
+}  // namespace ftcs::estimation

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/estimation/wait_density.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace ftcs::estimation {
+namespace {
+
+double integral(const WaitDensity& waits) {
+  double sum = 0.0;
+  for (double edge = 1.0; edge < 1.6e7; edge *= 1.01) sum += 0.01 * edge * waits.at(1.005 * edge);
+  return sum;
+}
+
+TEST(WaitDensity, starts_as_an_exponential_of_the_mean_wait) {
+  WaitDensity waits;
+  waits.start(60e3);
+  EXPECT_NEAR(integral(waits), 1.0, 0.15);
+  for (const double nu : {30e3, 60e3, 90e3}) {
+    const double density = std::exp(-nu / 60e3) / 60e3;
+    EXPECT_NEAR(waits.at(nu), density, 0.5 * density) << nu;
+  }
+}
+
+TEST(WaitDensity, short_waits_that_were_seldom_seen_are_as_dense_as_longer_ones) {
+  WaitDensity waits;
+  waits.start(60e3);
+  EXPECT_NEAR(waits.at(100.0) * 60e3, 1.0, 0.6);
+  EXPECT_NEAR(waits.at(2.0) / waits.at(3000.0), 1.0, 0.5);
+}
+
+TEST(WaitDensity, learns_what_waits_are_like) {
+  WaitDensity waits;
+  waits.start(60e3);
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> even(0.0, 12e3);
+  for (int k = 0; k < 3000; ++k) waits.learn(even(random), 1.0);
+  EXPECT_NEAR(integral(waits), 1.0, 0.15);
+  EXPECT_NEAR(waits.at(5e3) * 12e3, 1.0, 0.3);
+  EXPECT_LT(waits.at(100e3) * 12e3, 0.01);
+}
+
+TEST(WaitDensity, any_wait_is_possible) {
+  WaitDensity waits;
+  waits.start(1e3);
+  for (double nu = 0.1; nu < 1e18; nu *= 3.0) EXPECT_GT(waits.at(nu), 0.0) << nu;
+}
+
+}  // namespace
+}  // namespace ftcs::estimation
