@@ -30,7 +30,9 @@ constexpr double kAgree = 3.0;
 /// apart.
 constexpr std::uint8_t kExplainedAlone = 8;
 constexpr double kSharp = 4.0;
-constexpr double kFarApart = 0.125;
+constexpr double kSharper = 32.0;
+constexpr double kFarApart = 1.0 / 32.0;
+constexpr double kShort = 1.0 / 64.0;
 constexpr double kLeastLogDensity = -600.0;
 
 }  // namespace
@@ -65,12 +67,13 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise =
-      std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
+      std::max({plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward),
+                plain_.offset_sigma_ns(0.0)});
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
   const bool contradicts = noise < kFarApart * apart;
   const bool sharp =
-      contradicts || noise < kSharp * floor_.scale() || noise < kUseful * floor_.mean_wait();
-  const bool sharper = kSharp * noise < floor_.scale();
+      contradicts || noise < kSharp * floor_.scale() || noise < kShort * floor_.mean_wait();
+  const bool sharper = kSharper * noise < floor_.scale();
   if (!sharp || (own > 0.5 && credit < 0.5)) {
     explained_alone_ = 0;
   } else if (credit > 0.5 && (own < 0.5 || sharper)) {
