@@ -51,14 +51,15 @@ bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
   return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), noise);
 }
 
-/// Both say the same of the offset, and the first picture, which has heard everything, knows it
-/// better than the fit: to believe the floor then moves nothing, and what comes late from now on
+/// Both say the same of the offset, and the first picture, which has heard everything, knows it no
+/// worse than the fit: to believe the floor then moves nothing, and what comes late from now on
 /// will not either.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
   const double floor = floor_.offset_sigma_ns(0.0);
-  return plain_.offset_sigma_ns(0.0) < floor && apart < kAgree * floor;
+  const double plain = plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
+  return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
 /// Where messages wait the first picture is never as sharp as the waits are long, nor as it is
