@@ -202,7 +202,7 @@ void add_link_flags(CLI::App& command, EthercatArguments& arguments) {
                    "reset SubDevices even if another MainDevice has them in OP");
 }
 
-void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
+void add_servo_flags(CLI::App& command, EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
   command.add_option("--servo", arguments.servo, "ftcs (default), pics, adaptive, soem-pi or none")
       ->check(CLI::IsMember(std::vector<std::string>(daemon::cycle_law_names().begin(),
@@ -225,13 +225,11 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
   command.add_option("--lock-band", arguments.lock,
                      "locked within this phase, lost beyond four times of it; default 5us");
   command.add_flag("--slew", arguments.slew, "the servo removes the first phase, no jump");
-  command.add_option("--drift-pulses", options.drift_pulses,
-                     "before the first cycle; default 15000");
-  command.add_option("--spin", arguments.spin, "keep the processor busy so long before a cycle");
-  command.add_option("--priority", options.priority, "SCHED_FIFO, 0 for none; default 80")
-      ->check(CLI::Range(0, 99));
-  command.add_option("--cpu", options.cpu, "pin to this processor");
-  command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+}
+
+/// What drives bear before they are stopped, and what becomes of them.
+void add_drive_flags(CLI::App& command, EthercatArguments& arguments) {
+  daemon::RunOptions& options = arguments.options;
   command
       .add_option("--sync-error-limit", options.sync_error_limit,
                   "0x10F1:02 of the drives: a missed SYNC0 window counts 3; default 17, 0 never")
@@ -263,6 +261,19 @@ void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
                   "seconds in which drives may be out of reach before the rest is stopped")
       ->check(CLI::Range(0.0, 1e6));
   command.add_flag("!--no-motion", options.move, "leave the axes disabled");
+}
+
+void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
+  daemon::RunOptions& options = arguments.options;
+  add_servo_flags(command, arguments);
+  command.add_option("--drift-pulses", options.drift_pulses,
+                     "before the first cycle; default 15000");
+  command.add_option("--spin", arguments.spin, "keep the processor busy so long before a cycle");
+  command.add_option("--priority", options.priority, "SCHED_FIFO, 0 for none; default 80")
+      ->check(CLI::Range(0, 99));
+  command.add_option("--cpu", options.cpu, "pin to this processor");
+  command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+  add_drive_flags(command, arguments);
   command.add_flag("-q,--quiet", options.quiet, "no live lines");
   command.add_option("--json", options.json, "write the figures to this file");
   command.add_option("--csv", options.csv, "write each cycle to this file");
