@@ -35,7 +35,7 @@ RealClock::RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock c
       clock_(std::move(clock)),
       timer_(kernel),
       utc_(kernel, log, clock_.device().name(), std::move(utc), clock_.device().is_system()),
-      good_rate_(clock_.tracking_rate()) {}
+      kept_rate_(clock_.tracking_rate()) {}
 
 void RealClock::before_wait(std::optional<std::int64_t> at_most_ns) {
   (void)clock_.read();  // what is left of a correction counts from now
@@ -82,8 +82,10 @@ void RealClock::follow_offset() {
 std::optional<std::string> RealClock::attend(bool steering, bool locked,
                                              const ServoSnapshot& servo) {
   if (const auto error = clock_.failure()) return describe(name(), *error);
-  if (locked) good_rate_ = clock_.tracking_rate();
-  const std::int64_t raw_s = kernel_.clock_ns(CLOCK_MONOTONIC_RAW) / kNsPerSecond;
+  const std::int64_t raw_ns = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  if (locked) kept_rate_.note(clock_.tracking_rate(), raw_ns);
+  was_locked_ = locked;
+  const std::int64_t raw_s = raw_ns / kNsPerSecond;
   if (raw_s == attended_raw_s_) return std::nullopt;
   attended_raw_s_ = raw_s;
   report_foreign();
@@ -172,11 +174,12 @@ void RealClock::publish(bool locked, const ServoSnapshot& servo) {
 }
 
 void RealClock::stop() {
-  if (clock_.is_steered() && clock_.tracking_rate() != good_rate_) {
+  const Rate kept = kept_rate_.rate();
+  if (clock_.is_steered() && !std::exchange(was_locked_, true)) {
     log_(LogLevel::kNotice, "{}: not locked: leaving a rate of {:+.3f} ppb, the last good one",
-         name(), good_rate_.ppb());
+         name(), kept.ppb());
   }
-  clock_.settle_at(good_rate_);
+  clock_.settle_at(kept);
   if (clock_.expiry() && !clock_.failure()) {
     log_(LogLevel::kError, "{}: the kernel refuses to end a correction; its rate is off", name());
   }

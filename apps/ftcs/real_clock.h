@@ -8,6 +8,7 @@
 
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/utc_watch.h"
+#include "ftcs/platform/kept_rate.h"
 #include "ftcs/platform/kernel_clock.h"
 #include "ftcs/platform/kernel_time_status.h"
 #include "ftcs/platform/wake_timer.h"
@@ -51,8 +52,8 @@ class RealClock {
   /// been applied, so that the clock is ours to describe.
   [[nodiscard]] std::optional<std::string> attend(bool steering, bool locked,
                                                   const ServoSnapshot& servo);
-  /// Before the program ends: leaves the last rate that was set while the servo was locked, or else
-  /// the one from before the first command.
+  /// Before the program ends: leaves the rate of the last seconds in which the servo was locked, or
+  /// else the one from before the first command.
   void stop();
 
  private:
@@ -72,7 +73,8 @@ class RealClock {
   bool scale_known_ = false;  ///< announced, and believed
   bool scale_changed_ = false;
   std::int64_t attended_raw_s_ = -1;
-  Rate good_rate_;
+  platform::KeptRate kept_rate_;
+  bool was_locked_ = false;
   bool publish_failed_ = false;
   bool expiry_said_ = false;
 };

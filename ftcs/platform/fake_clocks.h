@@ -11,13 +11,19 @@
 namespace ftcs::platform {
 
 /// FakeKernel with clocks that can be steered: CLOCK_REALTIME on the oscillator of
-/// CLOCK_MONOTONIC_RAW, /dev/ptp0 and /dev/ptp1 on one of their own each. Rates, steps and leaps
-/// are those of a kernel with infinitely short ticks; `ideal` time is what advance() counts.
+/// CLOCK_MONOTONIC_RAW, /dev/ptp0 and /dev/ptp1 on one of their own each. `ideal` time is what
+/// advance() counts.
 class FakeClocks : public FakeKernel {
  public:
   struct Clock {
     double time_ns = 0.0;
     double oscillator = 1.0;  ///< unsteered rate against ideal time
+    /// What a kernel multiplies cycles by is an integer: the clock runs at a multiple of this, and
+    /// at one more while it owes time to what was asked for. That is decided at ticks, of which an
+    /// idle processor has none, and when a rate is set. Zero: any rate.
+    double multiplier_unit = 0.0;
+    double owed_ns = 0.0;
+    bool catches_up = false;
     long tick = 10'000;
     long freq = 0;
     int status = STA_UNSYNC;
@@ -28,7 +34,16 @@ class FakeClocks : public FakeKernel {
       return 1.0 + static_cast<double>(tick - 10'000) * 1e-4 +
              static_cast<double>(freq) / 65536.0 * 1e-6;
     }
-    void advance(double ns) { time_ns += ns * oscillator * steering(); }
+    [[nodiscard]] double rate() const {
+      if (multiplier_unit == 0.0) return steering();
+      return (std::floor(steering() / multiplier_unit) + (catches_up ? 1.0 : 0.0)) *
+             multiplier_unit;
+    }
+    void advance(double ns) {
+      time_ns += ns * oscillator * rate();
+      owed_ns += ns * oscillator * (steering() - rate());
+    }
+    void decide() { catches_up = owed_ns > 0.0; }
   };
 
   // Relative to an epoch, so that a double resolves them.
@@ -126,6 +141,7 @@ class FakeClocks : public FakeKernel {
     const bool woken = timer_ns > 0 && static_cast<double>(timer_ns) <= timeout;
     run(woken ? static_cast<double>(timer_ns) : timeout);
     timer_ns = woken ? 0 : timer_ns - std::llround(timeout);
+    system.decide();
     for (pollfd& entry : descriptors) entry.revents = woken && entry.fd >= 0 ? POLLIN : 0;
     if (on_poll) on_poll();
     return woken ? 1 : 0;
@@ -231,6 +247,7 @@ class FakeClocks : public FakeKernel {
       if (is_system && std::abs(ppb) > 500'000.0) return EINVAL;
       if (!is_system && std::abs(ppb) > static_cast<double>(max_adj_ppb)) return ERANGE;
       clock.freq = request.freq;
+      clock.decide();
     }
     if ((request.modes & ADJ_SETOFFSET) != 0) {
       clock.time_ns += static_cast<double>(request.time.tv_sec) * 1e9 +

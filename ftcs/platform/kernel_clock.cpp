@@ -28,6 +28,12 @@ constexpr Duration kRetryInterval{Nanoseconds{10'000'000}};
 constexpr double kRateUnit = 2.0e-6 / 65536.0;
 // A leap is one second; readings around it may be this far from it.
 constexpr double kLeapToleranceNs = 100e6;
+// A kernel multiplies the cycles of its counter by an integer: CLOCK_REALTIME runs a little slower
+// or faster than asked for, by less than this, until the kernel next looks at what it owes.
+constexpr double kLargestWander = 250e-9;
+constexpr double kWanderFloorNs = 100.0;
+// What remains of it on average, if anything, is believed so slowly.
+constexpr double kAnchoringTimeNs = 4e9;
 constexpr std::int64_t kGainIntervalNs = 1'000'000'000;
 constexpr double kLargestGain = 200e-6;
 // Sixteen seconds of averaging bring the brackets' noise below 10^-8.
@@ -111,8 +117,18 @@ Duration KernelClock::beyond_bracket(Duration deviation,
   return deviation - Duration::from_ns(std::clamp(deviation.ns(), -half, half));
 }
 
+// The part of a deviation of CLOCK_REALTIME that what was commanded has to follow. The rest is the
+// kernel's to make good: a servo that did so too would do it twice.
+Duration KernelClock::not_made_good(Duration deviation,
+                                    std::int64_t elapsed_raw_ns) const noexcept {
+  const auto elapsed = static_cast<double>(elapsed_raw_ns);
+  const double bound = kWanderFloorNs + kLargestWander * elapsed;
+  const double wander = std::clamp(deviation.ns(), -bound, bound);
+  return deviation - Duration::from_ns(wander * (1.0 - std::min(elapsed / kAnchoringTimeNs, 1.0)));
+}
+
 // One reading of the device, made sense of: small deviations from what the commands say are the
-// truth (CLOCK_REALTIME) or cannot be seen (a hardware clock); large ones are somebody's step.
+// kernel's (CLOCK_REALTIME) or cannot be seen (a hardware clock); large ones are somebody's step.
 bool KernelClock::look() noexcept {
   if (failure_) return false;
   auto now = read_device();
@@ -122,9 +138,11 @@ bool KernelClock::look() noexcept {
   if (deviation.is_step) {
     note_leap_or_step(deviation, *now);
   } else if (device_.is_system()) {
-    const Duration seen = beyond_bracket(deviation.by, *now);
-    history_.shift_newest(seen);
-    learn_gain(seen, *now);
+    const Duration seen = wander_ + beyond_bracket(deviation.by - wander_, *now);
+    const Duration shift = not_made_good(seen, now->raw_ns - latest_raw_ns_);
+    history_.shift_newest(shift);
+    wander_ = seen - shift;
+    learn_gain(shift, *now);
   }
   take(*now, deviation.instant);
   return true;
@@ -155,6 +173,7 @@ void KernelClock::note_leap_or_step(const Deviation& deviation,
   ++foreign_steps_;
   foreign_.step = foreign_.step.value_or(Duration{}) + deviation.by;
   trusted_since_ns_ = now.clock_ns;
+  wander_ = {};
   forget_gain_interval();
 }
 
@@ -182,7 +201,7 @@ ClockReading KernelClock::read() noexcept {
 
 std::optional<FreeRunningTime> KernelClock::from_stamp(std::int64_t clock_ns) noexcept {
   const ClockReading now = read();
-  const LocalTime local = local_of(clock_ns);
+  const LocalTime local = local_of(clock_ns) - wander_;
   if (clock_ns < trusted_since_ns_) return std::nullopt;
   const std::int64_t doubt_ns = latest_width_ns_ + kReadingToleranceNs;
   if (local - now.local > Duration::from_whole_ns(doubt_ns)) return std::nullopt;
@@ -259,15 +278,18 @@ std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noe
   return std::nullopt;
 }
 
-// The reading after a change says where CLOCK_REALTIME is. It says how late the change of a
-// hardware clock came, if the command was held up for longer than readings are wide.
+// The reading after a change says where in between it lay: always of CLOCK_REALTIME, which is read
+// together with its own oscillator; of a hardware clock if the command was held up for longer than
+// readings are wide.
 void KernelClock::place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept {
   const FreeRunningTime instant = free_at_raw(after.raw_ns);
-  const Duration seen = local_of(after.clock_ns) - history_.local_at(instant);
-  if (device_.is_system()) {
-    history_.shift_newest(beyond_bracket(seen, after));
-  } else if (doubt_ns > anchor_doubt_ns(after.raw_ns) + static_cast<double>(after.width_ns)) {
-    history_.shift_newest(Duration::from_ns(std::clamp(seen.ns(), -doubt_ns, doubt_ns)));
+  const Duration seen = local_of(after.clock_ns) - wander_ - history_.local_at(instant);
+  const double resolution =
+      device_.is_system() ? 0.0
+                          : anchor_doubt_ns(after.raw_ns) + static_cast<double>(after.width_ns);
+  if (doubt_ns > resolution) {
+    const double believed = device_.is_system() ? beyond_bracket(seen, after).ns() : seen.ns();
+    history_.shift_newest(Duration::from_ns(std::clamp(believed, -doubt_ns, doubt_ns)));
   }
   take(after, instant);
 }

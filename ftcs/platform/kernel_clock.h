@@ -21,7 +21,9 @@ struct ForeignSteering {
 /// A clock of the kernel as an AdjustableClock.
 ///
 /// The kernel shows the steered face only. The free-running face of CLOCK_REALTIME is
-/// CLOCK_MONOTONIC_RAW, the same oscillator; that of a PTP hardware clock is rebuilt by taking the
+/// CLOCK_MONOTONIC_RAW, the same oscillator, and its steered face is what was commanded: the kernel
+/// keeps to that on average, a few nanoseconds off in between, which it makes good by itself.
+/// The free-running face of a PTP hardware clock is rebuilt by taking the
 /// commands back (SteeringHistory), each placed between two readings. A kernel keeps no expiry, so
 /// that a correction is ended by whoever runs the loop: wake at expiry() (wait_for_expiry_ns()) and
 /// call read(), which ends what is due. Lateness is accounted for, not assumed away: the history
@@ -46,6 +48,10 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   /// than a step that somebody else made, or from the future.
   [[nodiscard]] std::optional<FreeRunningTime> from_stamp(std::int64_t clock_ns) noexcept;
 
+  /// What the clock itself shows, on the timescale of local time.
+  [[nodiscard]] LocalTime local_of(std::int64_t clock_ns) const noexcept {
+    return LocalTime{Duration::from_whole_ns(clock_ns) + timescale_offset_};
+  }
   /// When the running correction has to end; no value: none runs.
   [[nodiscard]] std::optional<FreeRunningTime> expiry() const noexcept { return end_; }
   /// How long to sleep on CLOCK_MONOTONIC, which may be steered along with this clock: never too
@@ -101,6 +107,8 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
     constexpr std::int64_t kUsualSpread = 4;
     return width_ns > kUsualSpread * device_.quickest_ns();
   }
+  [[nodiscard]] Duration not_made_good(Duration deviation,
+                                       std::int64_t elapsed_raw_ns) const noexcept;
   [[nodiscard]] Duration beyond_bracket(Duration deviation,
                                         const ClockDevice::Reading& reading) const noexcept;
   void learn_gain(Duration deviation, const ClockDevice::Reading& now) noexcept;
@@ -111,10 +119,6 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] Result<Rate, ClockError> command(Rate rate, Duration step) noexcept;
   void place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept;
   void end_correction() noexcept;
-  [[nodiscard]] LocalTime local_of(std::int64_t clock_ns) const noexcept {
-    return LocalTime{Duration::from_whole_ns(clock_ns) + timescale_offset_};
-  }
-
   ClockDevice device_;
   RateLimits limits_;
   bool may_steer_;
@@ -125,6 +129,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   ClockReading latest_{};  // of the last look at the device
   std::int64_t latest_raw_ns_ = 0;
   std::int64_t latest_width_ns_ = 0;
+  Duration wander_{};  // of CLOCK_REALTIME from what was commanded, at the last look
   // The reading that says best what the free-running face shows when CLOCK_MONOTONIC_RAW shows
   // something: not the last one, if that was wide.
   struct Anchor {

@@ -316,6 +316,32 @@ TEST(KernelClock, makes_the_leap_itself_where_the_kernel_does_not) {
   EXPECT_FALSE(clock.take_foreign_steering().step.has_value());
 }
 
+TEST(KernelClock, shows_what_was_commanded_where_the_kernel_runs_by_multiples) {
+  FakeClocks kernel;
+  kernel.system.multiplier_unit = 119e-9;
+  auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+  KernelClock clock(std::move(*device));
+  ASSERT_TRUE(clock.apply(hold(20.05)).ok());
+  const ClockReading start = clock.read();
+  double farthest = 0.0;
+  for (int i = 0; i < 1'000; ++i) {
+    (void)kernel.poll({}, 125);
+    const std::int64_t stamp = FakeClocks::kEpoch + std::llround(kernel.system.time_ns);
+    const double raw = kernel.raw;
+    const auto instant = clock.from_stamp(stamp);
+    ASSERT_TRUE(instant.has_value());
+    EXPECT_NEAR((*instant - FreeRunningTime::from_ns(std::llround(raw))).ns(), 0.0, 2.0)
+        << "a stamp is what the clock showed";
+    const ClockReading now = clock.read();
+    const double commanded = (now.free_running - start.free_running).ns() * (1.0 + 20.05e-6);
+    EXPECT_NEAR((now.local - start.local).ns(), commanded, 10.0);
+    const LocalTime shown = clock.local_of(stamp);
+    farthest = std::max(farthest, std::abs((shown - clock.local_at(*instant)).ns()));
+  }
+  EXPECT_GT(farthest, 5.0) << "or there was nothing to show";
+  EXPECT_LT(farthest, 20.0);
+}
+
 TEST(KernelClock, learns_what_the_kernel_makes_of_a_rate) {
   FakeClocks kernel;
   auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);

@@ -224,8 +224,8 @@ void PhcRunner::take_sample() {
     (void)discipline_.on_silence();
     return;
   }
-  // Before the servo acts on it: a step would hide what was seen.
-  const Duration offset = offset_from_reference(sink_->clock().local_at(*instant),
+  // As it was read, before the servo acts on it.
+  const Duration offset = offset_from_reference(sink_->clock().local_of(comparison->sink_ns),
                                                 ReferenceTime::from_ns(comparison->source_ns));
   const std::uint64_t steps = discipline_.counters().steps;
   if (!comparison_.is_exact()) feed(Direction::kBackward, *comparison, *instant);
