@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Length: one header and one source, so that a project takes the servo by copying two files. */
 #include "ftcs_addend.h"
 
 /* Times are differences in 2^-16 ns below 2^61, so that sums of a few of them fit 64 bits; what is
