@@ -28,6 +28,7 @@ struct PaperOptions {
   std::string json;
   std::string csv;
   std::string html;
+  std::uint64_t machine_seeds = 3;
   bool quiet = false;
   bool live = false;
 };
@@ -89,6 +90,7 @@ int reproduce_section5(const PaperOptions& options) {
   if (!interrupt.flag()) {
     control.progress = nullptr;
     experiment::add_contour(result, experiment::run_contours({}, 1, control));
+    result.two_machines = experiment::run_two_machines_table({}, options.machine_seeds, control);
   }
   if (options.live && !interrupt.flag()) {
     auto live = daemon::run_live_contours([&interrupt] { return interrupt.flag().load(); });
@@ -119,6 +121,10 @@ void add_paper_command(CLI::App& app, int& exit_code) {
                       "folder of the table files (default: built in)");
   command->add_option("--seeds", options->seeds, "runs of each row (default: in the files)")
       ->check(CLI::Range(kFewestSeeds, std::uint64_t{1'000'000}));
+  command
+      ->add_option("--machine-seeds", options->machine_seeds,
+                   "section 5: runs of two machines on one time; default 3")
+      ->check(CLI::Range(1, 1000));
   command->add_option("--threads", options->threads, "0 = one for each core");
   command->add_option("--json", options->json,
                       "write all figures to this file; - = standard output");

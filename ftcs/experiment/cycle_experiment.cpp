@@ -260,8 +260,9 @@ CycleResult run_table6(std::uint64_t seeds, const JobControl& control) {
 }
 
 bool CycleResult::passed() const noexcept {
-  return complete && std::all_of(checks.begin(), checks.end(),
-                                 [](const PaperCheckResult& check) { return check.passed; });
+  return complete && two_machines.passed() &&
+         std::all_of(checks.begin(), checks.end(),
+                     [](const PaperCheckResult& check) { return check.passed; });
 }
 
 }  // namespace ftcs::experiment

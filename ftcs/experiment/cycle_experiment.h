@@ -9,6 +9,7 @@
 #include "ftcs/experiment/contour_experiment.h"
 #include "ftcs/experiment/paper_run.h"
 #include "ftcs/experiment/parallel.h"
+#include "ftcs/experiment/two_machines.h"
 
 namespace ftcs::experiment {
 
@@ -81,7 +82,8 @@ struct CycleResult {
   std::vector<CycleTrace> traces;  ///< Fig. 7: the first seed
   ContourResult contour;           ///< no rows: not run
   std::vector<ContourRow>
-      live_contour;  ///< the same over a virtual link; nothing is demanded of it
+      live_contour;                ///< the same over a virtual link; nothing is demanded of it
+  TwoMachinesResult two_machines;  ///< no rows: not run
   std::uint64_t seeds = 0;
   bool complete = false;
   [[nodiscard]] bool passed() const noexcept;

@@ -19,12 +19,15 @@ namespace ftcs::node {
 class CirclePath {
  public:
   static constexpr double kRampCycles = 1000.0;
-  /// `turn_s` above zero.
-  constexpr CirclePath(double radius, double turn_s) noexcept : radius_(radius), turn_s_(turn_s) {}
+  /// `turn_s` above zero. `start_s`: the radius begins to grow at this instant of the path's time,
+  /// so that axes of different segments on one time start together.
+  constexpr CirclePath(double radius, double turn_s, double start_s = 0.0) noexcept
+      : radius_(radius), turn_s_(turn_s), start_s_(start_s) {}
 
   /// Once in a cycle, for the instant that it is about.
   void advance(bool all_enabled, double time_s) noexcept {
-    gain_ = std::clamp(gain_ + (all_enabled ? 1.0 : -1.0) / kRampCycles, 0.0, 1.0);
+    const double step = all_enabled ? (time_s < start_s_ ? 0.0 : 1.0) : -1.0;
+    gain_ = std::clamp(gain_ + step / kRampCycles, 0.0, 1.0);
     const double angle = 2.0 * std::numbers::pi * std::fmod(time_s, turn_s_) / turn_s_;
     const double radius = gain_ * radius_;
     even_ = static_cast<std::int32_t>(std::lround(radius * std::cos(angle)));
@@ -40,6 +43,7 @@ class CirclePath {
  private:
   double radius_;
   double turn_s_;
+  double start_s_;
   double gain_ = 0.0;
   std::int32_t even_ = 0;
   std::int32_t odd_ = 0;

@@ -27,11 +27,20 @@ ethercat::MainDeviceConfig CycleNode::main_config(const CycleNodeConfig& config,
   return result;
 }
 
+BusClockConfig CycleNode::bus_config(const CycleNodeConfig& config) noexcept {
+  BusClockConfig result = config.bus;
+  result.steer = config.bus_mode != BusMode::kFollow;
+  result.cycle = config.servo.cycle;
+  result.sync0_phase = config.sync0_phase;
+  return result;
+}
+
 CycleNode::CycleNode(const CycleNodeConfig& config) noexcept
     : config_(config),
       objects_(objects_for(config)),
       main_(main_config(config, objects_)),
       servo_(config.servo),
+      bus_(bus_config(config)),
       axes_(config.axes),
       supervision_(config.supervision, config.servo.law != CycleLaw::kNone) {}
 
@@ -62,9 +71,41 @@ const CycleDecision& CycleNode::end_cycle(bool answered, const ethercat::FrameSt
   sample_.has_received = answered;
   sample_.has_reference = answered && main_.last_cycle().has_reference;
   sample_.reference = main_.last_cycle().reference;
+  // In lead it is plant time that the cycle follows; should it stay away, the drives still have it.
+  if (config_.bus_mode == BusMode::kLead && answered && stamps.has_system_time) {
+    sample_.has_reference = true;
+    sample_.reference = stamps.system_time + Duration{config_.servo.transit};
+  }
   decision_ = servo_.update(sample_, now);
-  supervision_.cycle(main_, decision_.state, notes_);
+  watch_bus(answered, stamps);
+  const bool ready =
+      config_.bus_mode == BusMode::kFollow || bus_.decision().state == BusClockState::kLocked;
+  supervision_.cycle(main_, decision_.state, ready, notes_);
   return decision_;
+}
+
+void CycleNode::watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept {
+  using Kind = CycleNote::Kind;
+  const ethercat::CycleReport& report = main_.last_cycle();
+  BusClockSample sample;
+  // The servo's gates know a stamp that is wrong; after a lost frame the register is not certain.
+  sample.usable = answered && report.has_reference && stamps.has_system_time && offset_certain_ &&
+                  decision_.verdict == CycleVerdict::kUsed;
+  sample.dc = relabel<LocalTime>(report.reference);
+  sample.plant = stamps.system_time + Duration{config_.servo.transit};
+  sample.offset_ns = bus_offset_ns_;
+  const BusClockState before = bus_.decision().state;
+  bus_offset_ns_ = bus_.decision().offset_ns;  // this frame has written it
+  offset_certain_ = answered;
+  const BusClockDecision& decision = bus_.update(sample);
+  main_.shift_system_time(decision.offset_ns - bus_offset_ns_);
+  if (decision.state == before) return;
+  if (decision.state == BusClockState::kHoldover) notes_.add(Kind::kPlantTimeLost);
+  if (before == BusClockState::kHoldover) notes_.add(Kind::kPlantTimeBack);
+  if (decision.state == BusClockState::kLocked) notes_.add(Kind::kBusLocked);
+  if (before == BusClockState::kLocked && decision.state == BusClockState::kAcquiring) {
+    notes_.add(Kind::kBusLockLost);
+  }
 }
 
 std::int64_t CycleNode::margin_ns() const noexcept {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 
+#include "ftcs/discipline/bus_clock.h"
 #include "ftcs/discipline/cycle_servo.h"
 #include "ftcs/ethercat/maindevice/csp_profile.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
@@ -14,6 +15,13 @@
 #include "ftcs/node/drive_supervision.h"
 
 namespace ftcs::node {
+
+/// Who follows whom. The names in brackets are the field's.
+enum class BusMode : std::uint8_t {
+  kFollow,    ///< the cycle follows the drives, nobody moves them (master shift)
+  kLead,      ///< the cycle runs on plant time, the drives follow (bus shift)
+  kExternal,  ///< the cycle follows the drives, the drives follow plant time (DCX, external sync)
+};
 
 struct CycleNodeConfig {
   /// Its process.objects, cycle and sync0_shift are set by the node.
@@ -24,6 +32,8 @@ struct CycleNodeConfig {
   /// 0x10F1:02 of the drives: a missed SYNC0 window counts three, a good one takes one off, and the
   /// drive faults above the limit; 0: never. No value: what the drive has of itself.
   std::optional<std::uint16_t> sync_error_limit;
+  BusMode bus_mode = BusMode::kFollow;
+  BusClockConfig bus;  ///< its steer, cycle and sync0_phase are set by the node
   DriveSupervisionConfig supervision;
   DriveAxesConfig axes;
 };
@@ -71,6 +81,8 @@ class CycleNode {
   [[nodiscard]] bool stopped() const noexcept { return main_.stage() == ethercat::Stage::kStopped; }
   [[nodiscard]] const ethercat::MainDevice& main() const noexcept { return main_; }
   [[nodiscard]] const CycleServo& servo() const noexcept { return servo_; }
+  /// How far the distributed clock is from plant time, in every mode.
+  [[nodiscard]] const BusClockDecision& bus() const noexcept { return bus_.decision(); }
   [[nodiscard]] const DriveAxes& axes() const noexcept { return axes_; }
   [[nodiscard]] const DriveSupervision& supervision() const noexcept { return supervision_; }
   [[nodiscard]] const CycleNodeConfig& config() const noexcept { return config_; }
@@ -88,16 +100,21 @@ class CycleNode {
   [[nodiscard]] static Objects objects_for(const CycleNodeConfig& config) noexcept;
   [[nodiscard]] static ethercat::MainDeviceConfig main_config(const CycleNodeConfig& config,
                                                               const Objects& objects) noexcept;
+  [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
+  void watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept;
 
   CycleNodeConfig config_;
   Objects objects_;
   ethercat::MainDevice main_;
   CycleServo servo_;
+  BusClock bus_;
   DriveAxes axes_;
   DriveSupervision supervision_;
   CycleDecision decision_;
   CycleSample sample_;
   CycleNotes notes_;
+  std::int64_t bus_offset_ns_ = 0;  ///< in force when the next frame passes the reference
+  bool offset_certain_ = true;      ///< the last frame came back
 };
 
 }  // namespace ftcs::node

@@ -22,6 +22,10 @@ struct CycleNote {
     kBackInOp,
     kAxisFault,   ///< CiA 402: statusword in the state Fault
     kFaultReset,  ///< CiA 402: controlword bit 7 rises
+    kBusLocked,   ///< the distributed clock is within the band of plant time
+    kBusLockLost,
+    kPlantTimeLost,  ///< holdover: the bus goes on at its last rate
+    kPlantTimeBack,
   };
   static constexpr std::uint16_t kNobody = 0xFFFF;
   Kind kind = Kind::kLocked;

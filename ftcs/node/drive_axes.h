@@ -15,6 +15,7 @@ struct DriveAxesConfig {
   bool move = true;          ///< false: all axes stay disabled
   double radius = 10'000.0;  ///< of the circles, counts
   double turn_s = 2.0;       ///< above zero
+  double start_s = 0.0;      ///< reference time at which the circles begin; zero: at once
   /// How often the fault of one axis (CiA 402) is reset in a run. A drive that faults has a reason
   /// that somebody should look at before it moves again: zero, unless asked for.
   std::uint32_t fault_resets = 0;
@@ -29,7 +30,7 @@ class DriveAxes {
   static constexpr std::uint64_t kCyclesBetweenResets = 100;
 
   explicit DriveAxes(const DriveAxesConfig& config) noexcept
-      : config_(config), path_(config.radius, config.turn_s) {}
+      : config_(config), path_(config.radius, config.turn_s, config.start_s) {}
 
   /// One cycle. `in_op`: the drives take outputs; `time_s`: reference time that the outputs are
   /// for.

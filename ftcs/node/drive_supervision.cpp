@@ -7,13 +7,13 @@ using ethercat::AlState;
 using ethercat::FailureKind;
 using Kind = CycleNote::Kind;
 
-void DriveSupervision::cycle(ethercat::MainDevice& main, CycleState state,
+void DriveSupervision::cycle(ethercat::MainDevice& main, CycleState state, bool ready,
                              CycleNotes& notes) noexcept {
   ++cycles_;
   const bool locked = state == CycleState::kLocked;
   watch_lock(main, locked, notes);
   watch_drives(main, notes);
-  bring_to_op(main, locked, notes);
+  bring_to_op(main, locked, ready, notes);
 }
 
 void DriveSupervision::watch_lock(ethercat::MainDevice& main, bool locked,
@@ -25,7 +25,7 @@ void DriveSupervision::watch_lock(ethercat::MainDevice& main, bool locked,
   if (locked && lock_cycle_ < 0) lock_cycle_ = static_cast<std::int64_t>(cycles_);
   if (!followed_) return;
   const bool gave_up_waiting =
-      lock_cycle_ < 0 && config_.await_limit > 0 && cycles_ >= config_.await_limit;
+      asked_at_ == 0 && config_.await_limit > 0 && cycles_ >= config_.await_limit;
   if (gave_up_waiting) main.stop(FailureKind::kNeverLocked);
   const bool fatal = config_.lock_policy == LockPolicy::kFatal && lock_.without() > 0;
   const bool too_long =
@@ -65,7 +65,7 @@ void DriveSupervision::watch_drive(const ethercat::SubDeviceInfo& device, std::s
 }
 
 /// OP once the cycle is locked; a SubDevice that left it is acknowledged and asked again.
-void DriveSupervision::bring_to_op(ethercat::MainDevice& main, bool locked,
+void DriveSupervision::bring_to_op(ethercat::MainDevice& main, bool locked, bool ready,
                                    CycleNotes& notes) noexcept {
   const bool all_in_op = main.last_cycle().all_operational();
   if (op_cycle_ < 0 && all_in_op) op_cycle_ = static_cast<std::int64_t>(cycles_);
@@ -73,6 +73,7 @@ void DriveSupervision::bring_to_op(ethercat::MainDevice& main, bool locked,
                        (config_.lock_policy == LockPolicy::kAdvisory && asked_at_ > 0);
   if (!may_ask || all_in_op) return;
   if (asked_at_ == 0) {
+    if (!ready) return;
     asked_at_ = cycles_;
     main.request_operational();
     notes.add(Kind::kOpRequested);

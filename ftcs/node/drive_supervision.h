@@ -25,7 +25,7 @@ struct DriveSupervisionConfig {
   std::uint64_t unlocked_limit = 10'000;
   /// OP is asked for when the cycle is locked. False: with the first cycle.
   bool await_lock = true;
-  /// Without a first lock for so long everything is stopped. Zero: wait for ever.
+  /// Without a first lock, or not ready, for so long everything is stopped. Zero: wait for ever.
   std::uint64_t await_limit = 0;
   /// From asking for OP to the first recovery of a drive that is not in it, and between two.
   std::uint64_t first_recovery = 1000;
@@ -41,8 +41,9 @@ class DriveSupervision {
   DriveSupervision(const DriveSupervisionConfig& config, bool followed) noexcept
       : config_(config), followed_(followed) {}
 
-  /// Once in a cycle, after its frame and the servo's decision.
-  void cycle(ethercat::MainDevice& main, CycleState state, CycleNotes& notes) noexcept;
+  /// Once in a cycle, after its frame and the servo's decision. `ready`: besides the lock nothing
+  /// speaks against OP.
+  void cycle(ethercat::MainDevice& main, CycleState state, bool ready, CycleNotes& notes) noexcept;
 
   [[nodiscard]] const LockWatch& lock() const noexcept { return lock_; }
   /// Number of the first cycle that was locked, and that saw all in OP; -1: none yet.
@@ -54,7 +55,7 @@ class DriveSupervision {
   void watch_drives(const ethercat::MainDevice& main, CycleNotes& notes) noexcept;
   void watch_drive(const ethercat::SubDeviceInfo& device, std::size_t n,
                    CycleNotes& notes) noexcept;
-  void bring_to_op(ethercat::MainDevice& main, bool locked, CycleNotes& notes) noexcept;
+  void bring_to_op(ethercat::MainDevice& main, bool locked, bool ready, CycleNotes& notes) noexcept;
 
   enum class Seen : std::uint8_t { kNotYet, kInOp, kLeftOp, kOutOfReach };
 

@@ -13,9 +13,11 @@ namespace ftcs {
 [[nodiscard]] Table cycle_table(const experiment::CycleResult& result);
 /// The circle of two axes: contour error and missed SYNC0 windows of each way to keep the cycle.
 [[nodiscard]] Table contour_table(const std::vector<experiment::ContourRow>& rows);
+/// Two machines, one time: SYNC0 against SYNC0 and the circle whose axes stand apart.
+[[nodiscard]] Table two_machines_table(const experiment::TwoMachinesResult& result);
 [[nodiscard]] std::string cycle_console(const experiment::CycleResult& result);
-/// {"version", "passed", "tables": {"table6": [...]}, "checks", "choices", "figures": {"figure7"},
-/// "contour": {"world", "rows": [...], "live": [...]}}.
+/// {"version", "passed", "tables": {"table6": [...], "two_machines": [...]}, "checks", "choices",
+/// "figures": {"figure7"}, "contour": {"world", "rows": [...], "live": [...]}}.
 [[nodiscard]] Json cycle_json(const experiment::CycleResult& result, const std::string& version);
 [[nodiscard]] std::string cycle_html(const experiment::CycleResult& result,
                                      const std::string& version);

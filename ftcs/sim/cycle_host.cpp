@@ -27,7 +27,10 @@ WireTime CycleHost::instant_of(FreeRunningTime reading) {
 }
 
 bool CycleHost::pass(ethercat::ConstBytes frame, bool lost) {
-  stamps_.sent = stamps_.received = shown_at(now_);
+  stamps_.sent = stamps_.received = shown_at(now_) + (noise_ ? noise_() : Duration{});
+  const auto plant = plant_ ? plant_(stamps_.sent) : std::nullopt;
+  stamps_.has_system_time = plant.has_value();
+  stamps_.system_time = plant.value_or(ReferenceTime{});
   if (frame.empty() || lost) return false;
   std::copy(frame.begin(), frame.end(), buffer_.begin());
   const ethercat::Bytes bytes = ethercat::Bytes{buffer_}.first(frame.size());

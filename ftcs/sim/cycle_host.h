@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 
 #include "ftcs/node/cycle_node.h"
 #include "ftcs/sim/drives/segment.h"
@@ -15,6 +17,9 @@ namespace ftcs::sim {
 /// and is late where a test or an experiment says so. Replaces socket and clock, nothing between.
 class CycleHost {
  public:
+  /// What the host believes plant time to be when its clock shows so much; none: it does not know.
+  using PlantClock = std::function<std::optional<ReferenceTime>(FreeRunningTime)>;
+
   /// A frame of the bring-up follows the last one after so long.
   static constexpr Nanoseconds kBringUpRoundTrip{20'000};
   /// From sending a cycle's frame to the servo's update.
@@ -25,6 +30,9 @@ class CycleHost {
   CycleHost(const node::CycleNodeConfig& config, ethercat::Segment& segment,
             ethercat::WireTime start, Oscillator* crystal = nullptr);
 
+  void set_plant_clock(PlantClock clock) { plant_ = std::move(clock); }
+  /// Noise of the stamps that the host has of its frames, set anew for each.
+  void set_stamp_noise(std::function<Duration()> noise) { noise_ = std::move(noise); }
   /// Until the cyclic part; false: it came to an end before, node().main().failure() tells why.
   bool bring_up();
   /// One cycle whose task wakes `late` after its trigger, and whose frame does not come back if it
@@ -51,6 +59,8 @@ class CycleHost {
   std::unique_ptr<node::CycleNode> node_;
   ethercat::WireTime now_;
   ethercat::FrameStamps stamps_;
+  PlantClock plant_;
+  std::function<Duration()> noise_;
   std::array<std::uint8_t, ethercat::kMaxFrameSize> buffer_{};
 };
 

@@ -147,6 +147,14 @@ const char* name(node::CycleNote::Kind kind) {
       return "axis in fault";
     case node::CycleNote::Kind::kFaultReset:
       return "axis fault reset";
+    case node::CycleNote::Kind::kBusLocked:
+      return "bus on plant time";
+    case node::CycleNote::Kind::kBusLockLost:
+      return "bus off plant time";
+    case node::CycleNote::Kind::kPlantTimeLost:
+      return "plant time lost, bus in holdover";
+    case node::CycleNote::Kind::kPlantTimeBack:
+      return "plant time back";
   }
   return "unknown";
 }

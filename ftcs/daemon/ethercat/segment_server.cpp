@@ -71,7 +71,7 @@ void SegmentServer::build() {
       spec.parts.emplace_back(sim::RandomWalkFm{options_.random_walk_ppb * 1e-9});
     }
     crystals_.push_back(
-        std::make_unique<SimulatedCrystal>(spec, options_.seed, n, on_wire(start_)));
+        std::make_unique<sim::SimulatedCrystal>(spec, options_.seed, n, on_wire(start_)));
     ethercat::SubDeviceConfig config;
     config.identity.serial = static_cast<std::uint32_t>(n + 1);
     // Local clocks that started at different times, as switched-on drives do.

@@ -8,7 +8,7 @@
 
 #include "ftcs/platform/ethercat_link.h"
 #include "ftcs/sim/drives/segment.h"
-#include "ftcs/sim/oscillator.h"
+#include "ftcs/sim/drives/simulated_crystal.h"
 
 namespace ftcs::daemon {
 
@@ -41,27 +41,6 @@ struct SegmentOptions {
   std::string json;
 };
 
-/// A crystal of the simulator on the time of the wire.
-class SimulatedCrystal final : public ethercat::LocalOscillator {
- public:
-  SimulatedCrystal(sim::OscillatorSpec spec, std::uint64_t seed, std::uint64_t index,
-                   ethercat::WireTime start)
-      : oscillator_(std::move(spec), seed, index), start_(start) {}
-  [[nodiscard]] Duration reading(ethercat::WireTime instant) noexcept override {
-    return oscillator_.reading_at(sim::TrueTime{instant - start_}).since_epoch() +
-           extra_.reading(instant);
-  }
-  /// An additional deviation from an instant on.
-  void skew(double ppm, ethercat::WireTime from) noexcept {
-    extra_.set_rate(Rate::from_ratio(ppm * 1e-6), from);
-  }
-
- private:
-  sim::Oscillator oscillator_;
-  ethercat::WireTime start_;
-  ethercat::AffineOscillator extra_{Rate::from_ratio(0.0)};
-};
-
 /// Serves a segment of modelled drives on a link until it is told to stop.
 class SegmentServer {
  public:
@@ -85,7 +64,7 @@ class SegmentServer {
   SegmentOptions options_;
   platform::EthercatLink link_;
   std::unique_ptr<ethercat::Segment> segment_;
-  std::vector<std::unique_ptr<SimulatedCrystal>> crystals_;
+  std::vector<std::unique_ptr<sim::SimulatedCrystal>> crystals_;
   FreeRunningTime start_;
   bool started_ = false;
   std::size_t next_fault_ = 0;

@@ -57,6 +57,8 @@ bool Configurator::concerns(const SubDeviceInfo& device) const noexcept {
       return device.sii.coe() && !config_.objects.empty();
     case Step::kSizes:
       return device.sii.coe() && end_ == kAll;
+    case Step::kAlign:
+      return has_wanted_ && end_ == kAll && device.dc();
     case Step::kSync0:
       return config_.sync0 && device.dc();
     default:
@@ -133,6 +135,9 @@ void Configurator::request(FrameWriter& writer, const Network& network) noexcept
     case Step::kReferenceTime:
       writer.add(network.devices[network.reference].target(kFprd, reg::kSystemTime), 8);
       break;
+    case Step::kAlign:
+      writer.add_value(device.target(kFpwr, reg::kSystemTimeOffset), device.system_time_offset);
+      break;
     case Step::kSync0:
       write_sync0(writer, device);
       break;
@@ -171,11 +176,28 @@ void Configurator::write_sync0(FrameWriter& writer, const SubDeviceInfo& device)
   writer.add_value(device.target(kFpwr, reg::kDcActivation), kActivate);
 }
 
+Progress Configurator::take_reference_time(ConstBytes system_time, Network& network,
+                                           Failure& failure) noexcept {
+  const auto shown = load<std::uint64_t>(system_time, 0);
+  if (!has_wanted_ || end_ != kAll) {
+    plan_sync0(shown);
+    return Progress::kDone;
+  }
+  if (!network.devices[network.reference].dc64()) {
+    return fail(failure, {.kind = FailureKind::kNarrowClock,
+                          .position = static_cast<std::uint16_t>(network.reference)});
+  }
+  const auto wanted = static_cast<std::uint64_t>(wanted_.since_epoch().rounded_ns());
+  for (SubDeviceInfo& device : network.all()) device.system_time_offset += wanted - shown;
+  plan_sync0(wanted);
+  return Progress::kDone;
+}
+
 /// A whole multiple of the cycle, so that the phase is the same after each start, plus the shift.
-void Configurator::plan_sync0(ConstBytes system_time) noexcept {
+void Configurator::plan_sync0(std::uint64_t system_time) noexcept {
   const auto cycle = static_cast<std::uint64_t>(config_.cycle.count());
   const std::uint64_t earliest =
-      load<std::uint64_t>(system_time, 0) + static_cast<std::uint64_t>(config_.sync0_lead.count());
+      system_time + static_cast<std::uint64_t>(config_.sync0_lead.count());
   sync0_start_ =
       (earliest / cycle + 1) * cycle + static_cast<std::uint64_t>(config_.sync0_shift.count());
 }
@@ -202,7 +224,7 @@ Progress Configurator::reply(const FrameView& frame, Network& network, FreeRunni
         progress = fail(failure, {.kind = FailureKind::kNotAnswering,
                                   .position = static_cast<std::uint16_t>(device_)});
       } else if (step_ == Step::kReferenceTime) {
-        plan_sync0(frame[0].data());
+        progress = take_reference_time(frame[0].data(), network, failure);
       }
       break;
   }

@@ -25,7 +25,7 @@ struct ConfiguratorConfig {
 /// Logical address of the process image; outputs first, inputs behind them.
 inline constexpr std::uint32_t kLogicalStart = 0x00010000;
 /// What fits into one frame beside the other cyclic datagrams.
-inline constexpr std::size_t kMaxImageSize = 1400;
+inline constexpr std::size_t kMaxImageSize = 1380;
 
 /// Takes all SubDevices from INIT to SAFEOP, one step for all of them before the next: mailboxes,
 /// PREOP, objects, sizes of the process data (from CoE, else from the SII), sync managers and
@@ -40,6 +40,14 @@ class Configurator {
   void request(FrameWriter& writer, const Network& network) noexcept;
   [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime now,
                                Failure& failure) noexcept;
+  /// What the system time shall be when the frame that is answered next passes the reference.
+  /// Before SYNC0 is planned, and then alone, all clocks are put there by one and the same jump.
+  void want_system_time(ReferenceTime time) noexcept {
+    wanted_ = time;
+    has_wanted_ = true;
+  }
+  /// The clocks are being put elsewhere one after another: nobody shall follow anybody meanwhile.
+  [[nodiscard]] bool aligning() const noexcept { return step_ == Step::kAlign; }
   /// System time of the first SYNC0; zero if there is none.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return sync0_start_; }
 
@@ -52,6 +60,7 @@ class Configurator {
     kSizes,
     kChannels,
     kReferenceTime,
+    kAlign,
     kSync0,
     kRequestSafeOp,
     kAwaitSafeOp,
@@ -84,7 +93,9 @@ class Configurator {
   [[nodiscard]] bool walk(std::uint32_t value) noexcept;
   [[nodiscard]] ObjectAddress walk_object() const noexcept;
   [[nodiscard]] Progress place_image(Network& network, Failure& failure) noexcept;
-  void plan_sync0(ConstBytes system_time) noexcept;
+  [[nodiscard]] Progress take_reference_time(ConstBytes system_time, Network& network,
+                                             Failure& failure) noexcept;
+  void plan_sync0(std::uint64_t system_time) noexcept;
 
   ConfiguratorConfig config_;
   Step step_ = Step::kMailboxes;
@@ -98,6 +109,8 @@ class Configurator {
   FreeRunningTime deadline_;
   bool deadline_set_ = false;
   std::uint64_t sync0_start_ = 0;
+  bool has_wanted_ = false;
+  ReferenceTime wanted_;
 };
 
 }  // namespace ftcs::ethercat

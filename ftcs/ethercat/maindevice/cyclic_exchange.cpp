@@ -24,6 +24,8 @@ void CyclicExchange::start(const Network& network) noexcept {
   control_.fill(0);
   takes_part_.fill(false);
   estimate_ = {};
+  offset_changed_ = false;
+  writes_offset_ = false;
   image_size_ = 0;
   input_start_ = 0;
   expected_ = 0;
@@ -63,6 +65,12 @@ void CyclicExchange::request(FrameWriter& writer, const Network& network) noexce
     const Bytes time =
         writer.add(network.devices[network.reference].target(kFrmw, reg::kSystemTime), 8);
     store(time, 0, static_cast<std::uint64_t>(estimate_.since_epoch().rounded_ns()));
+    ++datagrams_;
+  }
+  writes_offset_ = offset_changed_ && asks_reference(network);
+  if (writes_offset_) {
+    const SubDeviceInfo& reference = network.devices[network.reference];
+    writer.add_value(reference.target(kFpwr, reg::kSystemTimeOffset), reference.system_time_offset);
     ++datagrams_;
   }
   writer.add(Target::logical(kLrw, kLogicalStart), ConstBytes{image_}.first(image_size_));
@@ -123,6 +131,10 @@ CycleReport CyclicExchange::reply(const FrameView& frame, Network& network) noex
   auto datagram = frame.begin();
   if (asks_reference(network)) {
     take_reference(*datagram, network, report);
+    ++datagram;
+  }
+  if (writes_offset_) {
+    if ((*datagram).working_counter() == 1) offset_changed_ = false;
     ++datagram;
   }
   const Datagram image = *datagram;

@@ -29,11 +29,12 @@ struct CycleReport {
   }
 };
 
-/// The cyclic frame: FRMW of the system time first (its latch is the start of frame), LRW of the
-/// process image, BRD of 0x092C, BRD of the AL status, and one datagram for the AL control or
-/// status of one SubDevice in turn; after a wrong working counter several, so that whoever is
-/// missing is soon known. A SubDevice that does not answer takes no part until it is admitted
-/// again: its process data is zero and nobody expects it in the working counter.
+/// The cyclic frame: FRMW of the system time first (its latch is the start of frame), where the
+/// bus is moved the reference's system time offset, LRW of the process image, BRD of 0x092C, BRD of
+/// the AL status, and one datagram for the AL control or status of one SubDevice in turn; after a
+/// wrong working counter several, so that whoever is missing is soon known. A SubDevice that does
+/// not answer takes no part until it is admitted again: its process data is zero and nobody expects
+/// it in the working counter.
 class CyclicExchange {
  public:
   void start(const Network& network) noexcept;
@@ -56,6 +57,8 @@ class CyclicExchange {
   /// What the reference will show when the next frame passes it, as the MainDevice knows it: should
   /// the reference be missing, the other clocks are given this instead of zero.
   void set_reference_estimate(ReferenceTime estimate) noexcept { estimate_ = estimate; }
+  /// The reference's system time offset has changed (0x0920): sent until it was taken.
+  void write_system_time_offset() noexcept { offset_changed_ = true; }
   /// Datagrams of the last request.
   [[nodiscard]] std::size_t datagrams() const noexcept { return datagrams_; }
   [[nodiscard]] Bytes outputs(const SubDeviceInfo& device) noexcept {
@@ -81,6 +84,8 @@ class CyclicExchange {
   std::uint16_t whole_ = 0;
   std::array<bool, kMaxSubDevices> takes_part_{};
   ReferenceTime estimate_;
+  bool offset_changed_ = false;
+  bool writes_offset_ = false;  ///< in the frame that is out
   std::size_t datagrams_ = 0;
   std::array<std::uint16_t, kMaxSubDevices> control_{};  ///< zero: nothing to send
   std::size_t turn_ = 0;

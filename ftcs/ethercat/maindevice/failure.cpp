@@ -47,6 +47,8 @@ const char* name(FailureKind kind) noexcept {
       return "process data larger than one frame";
     case FailureKind::kNoDistributedClock:
       return "no SubDevice with a distributed clock";
+    case FailureKind::kNarrowClock:
+      return "the reference clock has 32 bits only: plant time needs 64";
     case FailureKind::kReplaced:
       return "another SubDevice in the place of the one that was scanned";
     case FailureKind::kClockNotSteady:

@@ -31,6 +31,7 @@ enum class FailureKind : std::uint8_t {
   kSdoMalformed,          ///< mailbox tells what is wrong
   kProcessImageTooLarge,  ///< more than one frame holds
   kNoDistributedClock,    ///< nobody can be the reference
+  kNarrowClock,           ///< plant time asked for; the reference's system time has 32 bits
   kReplaced,              ///< what was restarted is not what was scanned: known, found
   kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/ethercat/maindevice/main_device.h"
 
+#include "ftcs/time/relabel.h"
+
 namespace ftcs::ethercat {
 
 namespace {
@@ -71,7 +73,7 @@ void MainDevice::write_frame(FrameWriter& writer) noexcept {
     case Stage::kConfigure:
       configurator_.request(writer, network_);
       // The clocks must not drift apart while the rest is being configured.
-      if (clocks_wanted()) {
+      if (clocks_wanted() && !configurator_.aligning()) {
         writer.add(network_.devices[network_.reference].target(Command::kFrmw, reg::kSystemTime),
                    8);
       }
@@ -144,8 +146,11 @@ FrameOutcome MainDevice::bring_up(const FrameView& frame, const FrameStamps& sta
     return advance(scanner_.reply(frame, network_, stamps.received, failure_));
   }
   if (stage_ == Stage::kClocks) {
-    return advance(clock_setup_.reply(frame, network_, stamps.sent, failure_));
+    const FreeRunningTime shown =
+        stamps.has_system_time ? relabel<FreeRunningTime>(stamps.system_time) : stamps.sent;
+    return advance(clock_setup_.reply(frame, network_, shown, failure_));
   }
+  if (stamps.has_system_time) configurator_.want_system_time(stamps.system_time);
   return advance(configurator_.reply(frame, network_, stamps.received, failure_));
 }
 
@@ -319,6 +324,12 @@ void MainDevice::recover(std::size_t position) noexcept {
   } else if (device.state == AlState::kSafeOp) {
     exchange_.request_state(position, static_cast<std::uint16_t>(AlState::kOp));
   }
+}
+
+void MainDevice::shift_system_time(std::int64_t by_ns) noexcept {
+  if (by_ns == 0 || !clocks_wanted()) return;
+  network_.devices[network_.reference].system_time_offset += static_cast<std::uint64_t>(by_ns);
+  exchange_.write_system_time_offset();
 }
 
 void MainDevice::begin_stop(const Failure& failure) noexcept {

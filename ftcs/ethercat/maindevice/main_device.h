@@ -54,6 +54,10 @@ enum class Stage : std::uint8_t {
 struct FrameStamps {
   FreeRunningTime sent;
   FreeRunningTime received;
+  /// What the system time of the segment shall be at `sent`, where it is not to be the
+  /// MainDevice's own clock: plant time, on the epoch of distributed clocks.
+  bool has_system_time = false;
+  ReferenceTime system_time{};
 };
 
 enum class FrameOutcome : std::uint8_t {
@@ -116,6 +120,9 @@ class MainDevice {
   void set_reference_estimate(ReferenceTime estimate) noexcept {
     exchange_.set_reference_estimate(estimate);
   }
+  /// In the cyclic stage: from the next frame on the reference's system time shows so much more
+  /// (0x0920). Small steps alone: SYNC0 is running.
+  void shift_system_time(std::int64_t by_ns) noexcept;
   /// System time of the first SYNC0.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return configurator_.sync0_start(); }
 
