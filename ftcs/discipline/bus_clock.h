@@ -63,7 +63,7 @@ struct BusClockDecision {
 /// The system time of the reference clock is R = L + offset, L the clock's own crystal, offset the
 /// register 0x0920. A written 0x0910 would carry the lateness of the frame that carries it; an
 /// increment of 0x0920 is a difference, and a difference has no lateness: each cycle a few
-/// nanoseconds are added, so that R runs at a commanded rate per L (decision 0016). L is known
+/// nanoseconds are added, so that R runs at a commanded rate per L (decision 0017). L is known
 /// exactly, because the offset is our own; the adaptive servo's estimator hears (plant, L) and
 /// tells offset e, rate and deviation without being moved by what is steered.
 ///
