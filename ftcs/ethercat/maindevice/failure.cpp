@@ -3,6 +3,30 @@
 
 namespace ftcs::ethercat {
 
+namespace {
+/// Of a cycle that ran.
+const char* name_in_operation(FailureKind kind) noexcept {
+  switch (kind) {
+    case FailureKind::kNotStopped:
+      return "SubDevices did not leave OP when they were stopped";
+    case FailureKind::kReplaced:
+      return "another SubDevice in the place of the one that was scanned";
+    case FailureKind::kClockNotSteady:
+      return "clock does not follow the reference";
+    case FailureKind::kWorkingCounter:
+      return "working counter wrong";
+    case FailureKind::kSyncLost:
+      return "cycle out of sync with the reference";
+    case FailureKind::kNeverLocked:
+      return "cycle never in phase with the reference";
+    case FailureKind::kLinkLost:
+      return "frames lost";
+    default:
+      return "unknown failure";
+  }
+}
+}  // namespace
+
 const char* name(FailureKind kind) noexcept {
   switch (kind) {
     case FailureKind::kNone:
@@ -31,8 +55,6 @@ const char* name(FailureKind kind) noexcept {
       return "bring-up does not come to an end";
     case FailureKind::kFrameTooLarge:
       return "request larger than one frame";
-    case FailureKind::kNotStopped:
-      return "SubDevices did not leave OP when they were stopped";
     case FailureKind::kStateRefused:
       return "state refused";
     case FailureKind::kStateTimeout:
@@ -49,20 +71,9 @@ const char* name(FailureKind kind) noexcept {
       return "no SubDevice with a distributed clock";
     case FailureKind::kNarrowClock:
       return "the reference clock has 32 bits only: plant time needs 64";
-    case FailureKind::kReplaced:
-      return "another SubDevice in the place of the one that was scanned";
-    case FailureKind::kClockNotSteady:
-      return "clock does not follow the reference";
-    case FailureKind::kWorkingCounter:
-      return "working counter wrong";
-    case FailureKind::kSyncLost:
-      return "cycle out of sync with the reference";
-    case FailureKind::kNeverLocked:
-      return "cycle never in phase with the reference";
-    case FailureKind::kLinkLost:
-      return "frames lost";
+    default:
+      return name_in_operation(kind);
   }
-  return "unknown failure";
 }
 
 }  // namespace ftcs::ethercat
