@@ -32,8 +32,10 @@ constexpr double kLeapToleranceNs = 100e6;
 // or faster than asked for, by less than this, until the kernel next looks at what it owes.
 constexpr double kLargestWander = 250e-9;
 constexpr double kWanderFloorNs = 100.0;
-// What remains of it on average, if anything, is believed so slowly.
-constexpr double kAnchoringTimeNs = 4e9;
+// What remains of it on average is believed so slowly: each command leaves some tenths of a
+// nanosecond, as the kernel counts whole ticks.
+constexpr double kAnchoringTimeNs = 1.5e9;
+constexpr double kLargestShare = 0.25;
 constexpr std::int64_t kGainIntervalNs = 1'000'000'000;
 constexpr double kLargestGain = 200e-6;
 // Sixteen seconds of averaging bring the brackets' noise below 10^-8.
@@ -124,7 +126,8 @@ Duration KernelClock::not_made_good(Duration deviation,
   const auto elapsed = static_cast<double>(elapsed_raw_ns);
   const double bound = kWanderFloorNs + kLargestWander * elapsed;
   const double wander = std::clamp(deviation.ns(), -bound, bound);
-  return deviation - Duration::from_ns(wander * (1.0 - std::min(elapsed / kAnchoringTimeNs, 1.0)));
+  const double share = std::min(elapsed / kAnchoringTimeNs, kLargestShare);
+  return deviation - Duration::from_ns(wander * (1.0 - share));
 }
 
 // One reading of the device, made sense of: small deviations from what the commands say are the
