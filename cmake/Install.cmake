@@ -3,6 +3,11 @@
 include(CMakePackageConfigHelpers)
 if(TARGET ftcs)
   install(TARGETS ftcs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/manual/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 FILES_MATCHING PATTERN "*.1")
+  install(FILES ${PROJECT_BINARY_DIR}/manual/completion.bash RENAME ftcs OPTIONAL
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+  install(FILES ${PROJECT_BINARY_DIR}/manual/completion.zsh RENAME _ftcs OPTIONAL
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
 endif()
 set(FTCS_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/ftcs)
 

@@ -22,6 +22,7 @@ void add_compare_command(CLI::App& app, int& exit_code);
 void add_demo_command(CLI::App& app, int& exit_code);
 void add_ethercat_command(CLI::App& app, int& exit_code);
 void add_ethercat_segment_command(CLI::App& app, int& exit_code);
+void add_manual_command(CLI::App& app, int& exit_code);
 void add_paper_command(CLI::App& app, int& exit_code);
 void add_phc_command(CLI::App& app, int& exit_code);
 void add_ptp_command(CLI::App& app, int& exit_code);

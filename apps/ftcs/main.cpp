@@ -49,6 +49,7 @@ int run(int argc, char** argv) {
   add_compare_command(app, exit_code);
   add_ethercat_command(app, exit_code);
   add_ethercat_segment_command(app, exit_code);
+  add_manual_command(app, exit_code);
   add_paper_command(app, exit_code);
   add_phc_command(app, exit_code);
   add_ptp_command(app, exit_code);
