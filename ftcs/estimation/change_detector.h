@@ -11,6 +11,12 @@
 
 namespace ftcs::estimation {
 
+/// What the last messages allow to believe of a sudden change.
+struct ChangeTrust {
+  bool sudden = true;        ///< a clock can have brought it; else nothing that one message shows
+  bool one_suffices = true;  ///< one message without a second that says the same
+};
+
 /// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between the models of a
 /// bank: C_ij = max(0, C_ij + l_j - l_i) for every model j that stands behind i, i.e. is wilder.
 /// Beyond the threshold model i has been overtaken by events and takes over the state of the most
@@ -55,26 +61,32 @@ class ChangeDetector {
     return overtaken;
   }
 
+  struct Takeover {
+    std::size_t source = kNone;
+    bool alone = false;  ///< for one message's sake
+  };
+
   /// The model that overtakes model i after `count` messages, the last of which had
-  /// `log_density`, or kNone. Clears its sums. Without `sudden` nothing that one message shows is
-  /// believed.
-  [[nodiscard]] std::size_t take_over(std::size_t i, double count,
-                                      const std::array<double, kSize>& log_density,
-                                      bool sudden) noexcept {
+  /// `log_density`, or kNone. Clears its sums.
+  [[nodiscard]] Takeover take_over(std::size_t i, double count,
+                                   const std::array<double, kSize>& log_density,
+                                   const ChangeTrust& trust) noexcept {
     // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
     const double caution = 1.0 + 16.0 / count;
     const std::size_t winner = most_convincing(i);
-    if (winner == kNone) return kNone;
+    if (winner == kNone) return {};
     const double latest = log_density[winner] - log_density[i];
-    if (latest <= 0.0) return kNone;  // what was put off is over
+    if (latest <= 0.0) return {};  // what was put off is over
     const bool abrupt = latest > kAbrupt;
-    const bool alone = static_cast<double>(sum(i, winner)) - latest < kSecond;
-    if (!sudden && (abrupt || winner >= kSudden)) return kNone;
+    const double before = static_cast<double>(sum(i, winner)) - latest;
+    const bool alone = before < (trust.one_suffices ? kSecond : kAbrupt);
+    if (!trust.sudden && (abrupt || winner >= kSudden)) return {};
+    if (alone && !trust.one_suffices) return {};
     const double enough = (alone ? kAlone : kThreshold) * caution;
     const double needed = abrupt ? enough : std::max(enough, kGradual);
-    if (sum(i, winner) <= static_cast<float>(needed)) return kNone;
+    if (sum(i, winner) <= static_cast<float>(needed)) return {};
     for (std::size_t j = std::min(first_of(i), kLast); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
-    return winner;
+    return {winner, alone};
   }
 
   /// How far model i is behind the most convincing wilder one, nats.

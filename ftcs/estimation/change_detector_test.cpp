@@ -12,7 +12,23 @@ namespace {
 
 using Detector = ChangeDetector<FullGrid>;
 using Densities = std::array<double, Detector::kSize>;
+constexpr ChangeTrust kTrusted{};
+constexpr ChangeTrust kNotSudden{false, true};
 constexpr double kLater = 1000.0;  // messages seen: the threshold is at its final value
+
+TEST(ChangeDetector, one_message_alone_takes_over_only_where_one_suffices) {
+  for (const bool suffices : {true, false}) {
+    Detector detector;
+    Densities l{};
+    l[20] = 12.0;
+    detector.add(l);
+    const auto first = detector.take_over(5, kLater, l, {true, suffices});
+    EXPECT_EQ(first.source, suffices ? 20U : Detector::kNone);
+    EXPECT_EQ(first.alone, suffices);
+    detector.add(l);
+    EXPECT_EQ(detector.take_over(5, kLater, l, {true, false}).alone, false);
+  }
+}
 
 TEST(ChangeDetector, a_wilder_model_that_explains_more_takes_over) {
   Detector detector;
@@ -20,11 +36,12 @@ TEST(ChangeDetector, a_wilder_model_that_explains_more_takes_over) {
   l[20] = 4.0;
   for (int i = 0; i < 3; ++i) {
     detector.add(l);
-    EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone);
+    EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, Detector::kNone);
   }
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone) << "sums start anew";
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, Detector::kNone)
+      << "sums start anew";
 }
 
 TEST(ChangeDetector, one_message_that_says_most_decides_sooner_than_many) {
@@ -34,10 +51,12 @@ TEST(ChangeDetector, one_message_that_says_most_decides_sooner_than_many) {
   detector.add(l);
   l[20] = 9.5;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U) << "12 nats, 9.5 of them at once";
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U)
+      << "12 nats, 9.5 of them at once";
   l[20] = 4.0;
   for (int i = 0; i < 3; ++i) detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone) << "12 nats by and by";
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, Detector::kNone)
+      << "12 nats by and by";
 }
 
 TEST(ChangeDetector, what_was_put_off_is_over_when_the_latest_message_says_otherwise) {
@@ -47,10 +66,10 @@ TEST(ChangeDetector, what_was_put_off_is_over_when_the_latest_message_says_other
   detector.add(l);
   l[20] = -1.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, Detector::kNone);
   l[20] = 0.5;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U);
 }
 
 TEST(ChangeDetector, a_calmer_model_never_takes_over) {
@@ -58,7 +77,7 @@ TEST(ChangeDetector, a_calmer_model_never_takes_over) {
   Densities l{};
   l[2] = 50.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, Detector::kNone);
 }
 
 TEST(ChangeDetector, what_one_message_shows_can_be_forbidden) {
@@ -66,13 +85,13 @@ TEST(ChangeDetector, what_one_message_shows_can_be_forbidden) {
   Densities l{};
   l[20] = 12.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, false), Detector::kNone);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kNotSudden).source, Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U);
   l[20] = 0.0;
   l[26] = 4.0;  // explains any message
   for (int i = 0; i < 5; ++i) detector.add(l);
-  EXPECT_EQ(detector.take_over(5, kLater, l, false), Detector::kNone);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 26U);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kNotSudden).source, Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 26U);
 }
 
 TEST(ChangeDetector, evidence_must_come_in_a_row) {
@@ -84,7 +103,7 @@ TEST(ChangeDetector, evidence_must_come_in_a_row) {
   for (int i = 0; i < 100; ++i) {
     detector.add(good);
     detector.add(bad);
-    ASSERT_EQ(detector.take_over(5, kLater, bad, true), Detector::kNone);
+    ASSERT_EQ(detector.take_over(5, kLater, bad, kTrusted).source, Detector::kNone);
   }
 }
 
@@ -93,8 +112,8 @@ TEST(ChangeDetector, early_on_it_asks_for_more) {
   Densities l{};
   l[20] = 20.0;
   detector.add(l);
-  EXPECT_EQ(detector.take_over(5, 8.0, l, true), Detector::kNone);
-  EXPECT_EQ(detector.take_over(5, kLater, l, true), 20U);
+  EXPECT_EQ(detector.take_over(5, 8.0, l, kTrusted).source, Detector::kNone);
+  EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U);
 }
 
 /// Two models with the same mean and variances 1 and 1.2, data from the first: exp(11) messages
@@ -110,7 +129,7 @@ TEST(ChangeDetector, false_alarms_are_rare) {
     l.fill(-0.5 * n * n);
     l[20] = -0.5 * n * n / 1.2 - 0.5 * 0.1823;
     detector.add(l);
-    if (detector.take_over(0, kLater, l, true) != Detector::kNone) ++alarms;
+    if (detector.take_over(0, kLater, l, kTrusted).source != Detector::kNone) ++alarms;
   }
   EXPECT_LE(alarms, 2);
 }

@@ -8,6 +8,7 @@
 
 #include "ftcs/estimation/change_detector.h"
 #include "ftcs/estimation/delay_shape.h"
+#include "ftcs/estimation/early_messages.h"
 #include "ftcs/estimation/evidence.h"
 #include "ftcs/estimation/gate.h"
 #include "ftcs/estimation/jump_watch.h"
@@ -97,7 +98,7 @@ class Estimator {
   void begin(std::size_t side) noexcept;
   void connect_second_direction(std::size_t side) noexcept;
   void unpin_delay(double first_sign, double variance) noexcept;
-  void detect_changes(const Row& log_density) noexcept;
+  void detect_changes(const Row& log_density, const ChangeTrust& trust) noexcept;
   [[nodiscard]] bool follow_gate(std::size_t side, double credit, double innovation) noexcept;
   void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
   void choose() noexcept;
@@ -120,6 +121,7 @@ class Estimator {
   ChangeDetector<Grid> detector_{};
   std::conditional_t<Grid::kWatchesJumps, JumpWatch, NoJumpWatch> jumps_{};
   Lateness lateness_{};
+  std::conditional_t<Grid::kWatchesJumps, EarlyMessages, NoEarlyMessages> early_{};
   std::array<NoiseLearner<Grid::kNoiseWindow>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};
   std::array<bool, 2> seen_{};

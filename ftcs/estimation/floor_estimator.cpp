@@ -165,7 +165,8 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
-        detector_.take_over(i, static_cast<double>(count_), in.log_density, early_ > 0);
+        detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, true})
+            .source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
     bank_.set(i, bank_.estimate(source));
   }

@@ -13,7 +13,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/estimation/load_aware_estimator.h"
+#include "ftcs/estimation/listener_for_test.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -23,43 +23,6 @@ using test::LoadedPathSpec;
 using test::PathErrors;
 using test::PathMessage;
 using test::traffic;
-
-/// Feeds an estimator as the servo does.
-class Listener {
- public:
-  explicit Listener(const LoadedPath& path) : interval_(path.interval_ns()) {
-    estimator_.expect_noise_of_at_least(0.4);
-  }
-  void hear(const PathMessage& message) {
-    (void)estimator_.update(observe(message));
-    if (estimator_.count() > 0) return;
-    started_ = false;  // it has given up: this message is the first
-    (void)estimator_.update(observe(message));
-  }
-  [[nodiscard]] double offset_ns(double now) const {
-    const Estimate& e = estimator_.estimate();
-    return base_ + e.x + e.y * (now - time_) / interval_;
-  }
-  [[nodiscard]] const LoadAwareEstimator<FullGrid>& estimator() const { return estimator_; }
-  [[nodiscard]] double sigma_ns(double now) const {
-    return estimator_.offset_sigma_ns((now - time_) / interval_);
-  }
-
- private:
-  Observation observe(const PathMessage& message) {
-    if (!started_) base_ = message.reading;
-    const double elapsed = started_ ? (message.time_ns - time_) / interval_ : 0.0;
-    started_ = true;
-    time_ = message.time_ns;
-    return {sign_of(message.direction), elapsed, message.reading - base_};
-  }
-
-  LoadAwareEstimator<FullGrid> estimator_{};
-  double interval_;
-  double base_ = 0.0;
-  double time_ = 0.0;
-  bool started_ = false;
-};
 
 /// Knows which messages waited.
 class Oracle {

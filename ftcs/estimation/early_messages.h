@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "ftcs/time/per_direction.h"
+
+namespace ftcs::estimation {
+
+/// Learns what early messages mean here. One that comes far before the moment believed is a clock
+/// whose rate has changed, or an outlier: a late transmit stamp, a lucky packet on a loaded bridge.
+/// The next messages tell. Until changes have proved to be the rule no single message changes the
+/// rate; and how often each direction has outliers is its share of what was believed early.
+class EarlyMessages {
+ public:
+  /// A message was judged: `far`: beyond five sigma early and taken for an outlier; `fits`: as
+  /// believed.
+  /// True: an early one before has proved to be an outlier; what spoke for a change is void.
+  [[nodiscard]] bool observe(Direction direction, bool far, bool fits) noexcept {
+    Side& side = sides_[direction];
+    side.messages =
+        std::min<std::uint16_t>(static_cast<std::uint16_t>(side.messages + 1U), kMemory);
+    if (side.messages == kMemory) {
+      side.messages /= 2;
+      side.outliers /= 2;
+    }
+    if (doubted_ > 0) {
+      --doubted_;
+      if (far || !fits) outlier(direction);
+    }
+    const bool explained = side.pending && !far && fits;
+    if (explained) outlier(direction);
+    side.pending = side.pending || far;
+    return explained;
+  }
+  /// A rate that has changed makes one direction ever earlier, the other later: whether this
+  /// message says otherwise than an early one that is not explained yet.
+  [[nodiscard]] bool contradicted_by(Direction direction, bool early) const noexcept {
+    return early ? sides_[opposite(direction)].pending : sides_[direction].pending;
+  }
+  /// The rate was changed; `alone`: for the last message's sake alone.
+  void changed(bool alone) noexcept {
+    for (const Direction direction : kDirections) {
+      if (sides_[direction].pending) changes_ = std::min<std::uint8_t>(changes_ + 1U, kMost);
+      sides_[direction].pending = false;
+    }
+    if (alone) doubted_ = kDoubted;
+  }
+  /// Whether one message alone may change the rate.
+  [[nodiscard]] bool one_suffices() const noexcept {
+    return changes_ >= kFewest + kPerOutlier * outliers_;
+  }
+  /// Probability of an early outlier.
+  [[nodiscard]] double probability(Direction direction) const noexcept {
+    const Side& side = sides_[direction];
+    const double share = side.outliers / (static_cast<double>(side.messages) + kPrior);
+    return std::clamp(share, kLeast, kLargest);
+  }
+
+ private:
+  struct Side {
+    std::uint16_t messages = 0;
+    std::uint16_t outliers = 0;
+    bool pending = false;  ///< an early one has not been explained
+  };
+  void outlier(Direction direction) noexcept {
+    Side& side = sides_[direction];
+    side.pending = false;
+    doubted_ = 0;
+    side.outliers = static_cast<std::uint16_t>(side.outliers + 1U);
+    outliers_ = std::min<std::uint8_t>(outliers_ + 1U, kMost);
+  }
+  static constexpr std::uint16_t kMemory = 4000;
+  static constexpr double kPrior = 100.0;
+  static constexpr double kLeast = 1e-5;
+  static constexpr double kLargest = 0.2;
+  static constexpr std::uint8_t kFewest = 2;
+  static constexpr std::uint8_t kPerOutlier = 4;
+  static constexpr std::uint8_t kMost = 40;
+  static constexpr std::uint8_t kDoubted = 2;
+
+  PerDirection<Side> sides_{};
+  std::uint8_t changes_ = 0;
+  std::uint8_t outliers_ = 0;
+  std::uint8_t doubted_ = 0;  ///< messages that may show that the last change was none
+};
+
+/// For a grid that has no room for it: nothing makes a packet early.
+class NoEarlyMessages {
+ public:
+  [[nodiscard]] bool observe(Direction, bool, bool) noexcept { return false; }
+  [[nodiscard]] bool contradicted_by(Direction, bool) const noexcept { return false; }
+  void changed(bool) noexcept {}
+  [[nodiscard]] bool one_suffices() const noexcept { return true; }
+  [[nodiscard]] double probability(Direction) const noexcept { return 1e-5; }
+};
+
+}  // namespace ftcs::estimation
