@@ -50,7 +50,7 @@ void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
       std::erase_if(scenario.servos, [&](const experiment::ScenarioServo& servo) {
         return std::find(options.servos.begin(), options.servos.end(), servo.name) ==
                    options.servos.end() &&
-               servo.name != experiment::kBoundName;
+               !experiment::is_bound(servo.name);
       });
     }
     if (!options.medians_only) continue;

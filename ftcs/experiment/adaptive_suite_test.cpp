@@ -53,7 +53,7 @@ std::vector<Scenario> suite() {
   for (const auto& file : files) {
     for (Scenario& scenario : parse_scenarios(with_servos(text_of(file)), file.string())) {
       scenario.seeds = std::min(scenario.seeds, kSeeds);
-      std::erase_if(scenario.servos, [](const auto& servo) { return servo.name == kBoundName; });
+      std::erase_if(scenario.servos, [](const auto& servo) { return is_bound(servo.name); });
       scenarios.push_back(std::move(scenario));
     }
   }

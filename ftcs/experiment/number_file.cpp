@@ -1,32 +1,36 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/experiment/number_file.h"
 
-#include <charconv>
-#include <cmath>
 #include <fstream>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "ftcs/experiment/scenario_error.h"
+#include "ftcs/record/fields.h"
 
 namespace ftcs::experiment {
 
-std::vector<double> read_number_file(const std::string& path) {
+std::vector<double> read_number_file(const std::string& path, std::size_t columns) {
   std::ifstream file(path);
   if (!file) throw ScenarioError(fmt::format("{}: cannot be read", path));
   std::vector<double> values;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
-    const auto first = line.find_first_not_of(" \t\r");
-    if (first == std::string::npos || line[first] == '#') continue;
-    const auto last = line.find_last_not_of(" \t\r");
-    double value = 0.0;
-    const char* end = line.data() + last + 1;
-    const auto [stop, error] = std::from_chars(line.data() + first, end, value);
-    if (error != std::errc{} || stop != end || !std::isfinite(value)) {
-      throw ScenarioError(fmt::format("{}:{}: \"{}\" is not a number", path, number, line));
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    const std::string_view text = trimmed(line);
+    if (text.empty() || text.front() == '#') continue;
+    const auto fields = split_fields(text, separator_of(text));
+    if (fields.size() != columns) {
+      throw ScenarioError(fmt::format("{}:{}: expected {} number{}, got \"{}\"", path, number,
+                                      columns, columns == 1 ? "" : "s", line));
     }
-    values.push_back(value);
+    for (const std::string_view field : fields) {
+      const auto value = parse_decimal(field);
+      if (!value)
+        throw ScenarioError(fmt::format("{}:{}: \"{}\" is not a number", path, number, field));
+      values.push_back(*value);
+    }
   }
   return values;
 }

@@ -17,10 +17,19 @@ namespace ftcs::experiment {
 struct ScenarioServo {
   std::string name;
   ServoConfig config;
+  bool clean_only = false;  ///< an oracle: it hears only messages that met nothing but jitter
 };
 
 /// The name of the known-noise Kalman filter: the last row of every comparison.
 inline constexpr std::string_view kBoundName = "bound";
+/// The same filter where messages wait, hearing only those that did not: what a servo could reach
+/// that knew which ones waited. It stands in the bound's place where [path] has a load or stalls.
+inline constexpr std::string_view kOracleName = "oracle";
+
+/// Is it the row that others are measured by, and no servo that anybody could use?
+[[nodiscard]] constexpr bool is_bound(std::string_view servo) noexcept {
+  return servo == kBoundName || servo == kOracleName;
+}
 
 /// Bounds of one figure over the seeds; not a number = none.
 struct FigureLimit {

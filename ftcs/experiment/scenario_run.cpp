@@ -107,6 +107,7 @@ RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo, st
                         RunTrace* trace) {
   sim::TwoWaySpec world = scenario.world;
   for (auto& node : world.nodes) node.discipline.servo = servo.config;
+  world.clean_only = servo.clean_only;
   if (trace != nullptr) trace->servo = servo.name;
   FigureObserver observer(scenario, trace);
   if (scenario.network == "ptp") {

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "ftcs/analysis/statistics.h"
+
 namespace ftcs::experiment {
 namespace {
 
@@ -122,6 +124,12 @@ ScenarioServo read_servo(TomlTable table, const Scenario& scenario) {
   return servo;
 }
 
+double spread_of(const std::vector<double>& values) {
+  RunningStatistics statistics;
+  for (const double value : values) statistics.add(value);
+  return statistics.standard_deviation();
+}
+
 /// Standard deviation of a link's noise, as the linear bound takes it.
 double jitter_sigma_ns(const sim::LinkSpec& link) {
   struct Sigma {
@@ -132,6 +140,24 @@ double jitter_sigma_ns(const sim::LinkSpec& link) {
     double operator()(const sim::BimodalJitter& j) const {
       const double spread = j.extra_ns * std::sqrt(j.probability * (1.0 - j.probability));
       return std::hypot(j.sigma_ns, spread);
+    }
+    double operator()(const sim::ParetoJitter& j) const {
+      // Infinite up to shape 2: there is no linear bound, and the scale is as good as anything.
+      if (j.shape <= 2.0) return j.scale_ns;
+      return j.scale_ns * std::sqrt(j.shape / (j.shape - 2.0)) / (j.shape - 1.0);
+    }
+    double operator()(const sim::RecordedJitter& j) const { return spread_of(*j.values_ns); }
+    double operator()(const sim::HistogramJitter& j) const {
+      double mean = 0.0;
+      double squares = 0.0;
+      double before = 0.0;
+      for (std::size_t i = 0; i < j.values_ns->size(); ++i) {
+        const double weight = (*j.cumulative)[i] - before;
+        before = (*j.cumulative)[i];
+        mean += weight * (*j.values_ns)[i];
+        squares += weight * (*j.values_ns)[i] * (*j.values_ns)[i];
+      }
+      return std::sqrt(std::max(squares - mean * mean, 0.0));
     }
   };
   return std::visit(Sigma{}, link.jitter);
@@ -174,8 +200,17 @@ bool has_linear_bound(const Scenario& scenario) {
   return nodes.size() == 1 && std::all_of(parts.begin(), parts.end(), known);
 }
 
+/// Do some messages meet nothing but jitter, and others more?
+bool has_clean_messages(const Scenario& scenario) {
+  const sim::NodeSpec& node = scenario.world.nodes.front();
+  const auto waits = [](const sim::LinkSpec& link) { return link.queueing || link.stalls; };
+  return scenario.network == "two-way" && (waits(node.forward) || waits(node.backward));
+}
+
 void add_bound(TomlTable& root, Scenario& scenario) {
-  ScenarioServo bound{std::string(kBoundName), default_config(ServoKind::kKalman, scenario)};
+  const bool oracle = has_clean_messages(scenario);
+  ScenarioServo bound{std::string(oracle ? kOracleName : kBoundName),
+                      default_config(ServoKind::kKalman, scenario), oracle};
   bound.config.kalman.noise = true_noise(scenario);
   if (auto table = root.table("bound")) {
     const bool wanted = table->boolean("enabled").value_or(true);

@@ -16,6 +16,7 @@ constexpr Range kAny{-1e18, 1e18};
 constexpr Range kFrequency{-0.5, 0.5};
 constexpr Range kAmount{0.0, 0.5};
 constexpr Range kProbability{0.0, 1.0};
+constexpr Range kUtilisation{0.0, 0.99};
 
 void read_steps_of_frequency(TomlTable& table, std::vector<sim::FrequencyPart>& parts) {
   for (auto& step : table.tables("frequency_step")) {
@@ -76,8 +77,52 @@ void read_replay(TomlTable& table, std::vector<sim::FrequencyPart>& parts) {
   replay->finish();
 }
 
+/// One column of delays, or two of delay and weight, in `unit` of [path] jitter.
+struct DelayTable {
+  std::vector<double> values_ns;
+  std::vector<double> weights;
+};
+
+DelayTable read_delay_table(TomlTable& jitter, bool weighted) {
+  const auto file = jitter.text("file");
+  if (!file) jitter.fail_here("jitter from a file needs file");
+  const double unit_ns = jitter.duration("unit", kPositive).value_or(Nanoseconds{1}).ns();
+  const auto numbers = read_number_file(jitter.beside(*file), weighted ? 2 : 1);
+  DelayTable table;
+  for (std::size_t i = 0; i < numbers.size(); i += weighted ? 2 : 1) {
+    table.values_ns.push_back(numbers[i] * unit_ns);
+    if (weighted) table.weights.push_back(numbers[i + 1]);
+  }
+  if (table.values_ns.empty()) jitter.fail("file", "there are no delays in it");
+  return table;
+}
+
+/// What is longer than the shortest of the record: the constant part is [path] delay.
+std::vector<double> above_least(std::vector<double> values_ns) {
+  const double least = *std::min_element(values_ns.begin(), values_ns.end());
+  for (double& value : values_ns) value -= least;
+  return values_ns;
+}
+
+sim::Jitter read_histogram(TomlTable& jitter) {
+  DelayTable table = read_delay_table(jitter, true);
+  double sum = 0.0;
+  for (const double weight : table.weights) {
+    if (weight < 0.0) jitter.fail("file", "a weight is negative");
+    sum += weight;
+  }
+  if (!(sum > 0.0)) jitter.fail("file", "the weights are all zero");
+  std::vector<double> cumulative;
+  double reached = 0.0;
+  for (const double weight : table.weights) cumulative.push_back((reached += weight) / sum);
+  return sim::HistogramJitter{
+      std::make_shared<const std::vector<double>>(above_least(std::move(table.values_ns))),
+      std::make_shared<const std::vector<double>>(std::move(cumulative))};
+}
+
 sim::Jitter read_jitter(TomlTable jitter) {
-  const auto kind = jitter.word("kind", {"none", "gaussian", "exponential", "gamma", "bimodal"});
+  const auto kind = jitter.word("kind", {"none", "gaussian", "exponential", "gamma", "bimodal",
+                                         "pareto", "file", "histogram"});
   if (!kind) jitter.fail_here("jitter needs a kind");
   const auto ns = [&](std::string_view key) {
     const auto value = jitter.duration(key, kNotNegative);
@@ -91,23 +136,82 @@ sim::Jitter read_jitter(TomlTable jitter) {
     const double shape = jitter.number("shape", {1e-3, 1e6}).value_or(1.0);
     result = sim::GammaJitter{shape, ns("scale")};
   }
+  if (*kind == "pareto") {
+    const double shape = jitter.number("shape", {0.1, 1e3}).value_or(2.0);
+    result = sim::ParetoJitter{shape, ns("scale")};
+  }
   if (*kind == "bimodal") {
     const double probability = jitter.ratio("probability", kProbability).value_or(0.5);
     const double extra = ns("extra");
     result = sim::BimodalJitter{probability, extra, ns("sigma")};
   }
+  if (*kind == "file") {
+    result = sim::RecordedJitter{std::make_shared<const std::vector<double>>(
+        above_least(read_delay_table(jitter, false).values_ns))};
+  }
+  if (*kind == "histogram") result = read_histogram(jitter);
   jitter.finish();
   return result;
 }
 
-void read_load(TomlTable& table, sim::LinkSpec& link) {
-  if (auto load = table.table("load")) {
-    sim::QueueingLoad queue;
-    queue.utilisation = load->ratio("utilisation", {0.0, 0.99}).value_or(0.0);
-    queue.service_ns = load->duration("service", kPositive).value_or(Nanoseconds{12'000}).ns();
-    link.queueing = queue;
-    load->finish();
+sim::LoadChange read_load_change(TomlTable change) {
+  const auto kind = change.word("kind", {"step", "square", "ramp", "on-off"});
+  const auto to = change.ratio("to", kUtilisation);
+  if (!kind || !to) change.fail_here("a change of the load needs kind and to");
+  sim::LoadChange result;
+  result.to = *to;
+  const auto seconds = [&](std::string_view key) {
+    const auto value = change.duration(key, kPositive);
+    if (!value) change.fail_here("a change of this kind needs " + std::string(key));
+    return value->seconds();
+  };
+  if (*kind == "on-off") {
+    result.kind = sim::LoadChange::Kind::kOnOff;
+    result.mean_idle_s = seconds("mean_idle");
+    result.mean_busy_s = seconds("mean_busy");
+  } else {
+    result.kind = *kind == "step"     ? sim::LoadChange::Kind::kStep
+                  : *kind == "square" ? sim::LoadChange::Kind::kSquare
+                                      : sim::LoadChange::Kind::kRamp;
+    result.period_s = seconds(*kind == "step" ? "at" : "period");
   }
+  change.finish();
+  return result;
+}
+
+sim::QueueingLoad read_queue(TomlTable load) {
+  sim::QueueingLoad queue;
+  queue.utilisation = load.ratio("utilisation", kUtilisation).value_or(0.0);
+  queue.service_ns = load.duration("service", kPositive).value_or(Nanoseconds{12'000}).ns();
+  queue.hops = static_cast<int>(load.integer("hops", {1.0, 100.0}).value_or(1));
+  const auto traffic =
+      load.word("traffic", {"full-frames", "g8261-1", "g8261-2"}).value_or("full-frames");
+  if (traffic == "g8261-1") queue.mix = sim::TrafficMix::kG8261Model1;
+  if (traffic == "g8261-2") queue.mix = sim::TrafficMix::kG8261Model2;
+  const auto scheduling =
+      load.word("scheduling", {"fifo", "priority", "preemption"}).value_or("fifo");
+  if (scheduling == "priority") queue.scheduling = sim::Scheduling::kPriority;
+  if (scheduling == "preemption") queue.scheduling = sim::Scheduling::kPreemption;
+  if (auto change = load.table("change")) queue.change = read_load_change(std::move(*change));
+  load.finish();
+  return queue;
+}
+
+sim::HostStalls read_stalls(TomlTable stalls) {
+  sim::HostStalls result;
+  const auto every = stalls.duration("every", kPositive);
+  const auto length = stalls.duration("length", kPositive);
+  if (!every || !length) stalls.fail_here("stalls need every and length, both means");
+  result.mean_interval_s = every->seconds();
+  result.mean_length_ns = length->ns();
+  result.shared = stalls.boolean("shared").value_or(false);
+  stalls.finish();
+  return result;
+}
+
+void read_load(TomlTable& table, sim::LinkSpec& link) {
+  if (auto load = table.table("load")) link.queueing = read_queue(std::move(*load));
+  if (auto stalls = table.table("stalls")) link.stalls = read_stalls(std::move(*stalls));
   if (auto bursts = table.table("bursts")) {
     sim::BurstyLoad burst;
     burst.mean_idle_s =

@@ -27,7 +27,7 @@ double limit_of(const ServoResult& servo, const std::string& figure, const std::
   return RunFigures::kNone;
 }
 
-bool is_bound(const ServoResult& servo) { return servo.servo == experiment::kBoundName; }
+bool is_bound(const ServoResult& servo) { return experiment::is_bound(servo.servo); }
 
 std::vector<const ServoResult*> ranked(const ScenarioResult& scenario) {
   std::vector<const ServoResult*> order;

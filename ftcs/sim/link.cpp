@@ -9,13 +9,25 @@ namespace ftcs::sim {
 
 Link::Link(LinkSpec spec, std::uint64_t seed, std::uint64_t index)
     : spec_(std::move(spec)),
+      queueing_(spec_.queueing, seed, index),
       jitter_(seed, "link jitter", index),
+      // Bursts alone: a queue's draws are its ports' own.
       load_(seed, "link load", index),
-      fate_(seed, "link fate", index) {}
+      fate_(seed, "link fate", index),
+      // Links 2n and 2n + 1 are the two directions of one host.
+      stall_(seed, "host stalls", spec_.stalls && spec_.stalls->shared ? index / 2 * 2 : index) {
+  if (spec_.stalls) next_stall_ = TrueTime{} + stall_gap();
+  if (const auto* recorded = std::get_if<RecordedJitter>(&spec_.jitter)) {
+    RandomStream start(seed, "record start", index);
+    first_packet_ = static_cast<std::size_t>(start.uniform() *
+                                             static_cast<double>(recorded->values_ns->size()));
+  }
+}
 
 double Link::jitter_ns() {
   struct Draw {
     RandomStream& random;
+    std::size_t packet;
     double operator()(const NoJitter&) const { return 0.0; }
     double operator()(const GaussianJitter& j) const { return j.sigma_ns * random.normal(); }
     double operator()(const ExponentialJitter& j) const { return j.mean_ns * random.exponential(); }
@@ -25,32 +37,21 @@ double Link::jitter_ns() {
       const double noise = j.sigma_ns * random.normal();
       return noise + (pick < j.probability ? j.extra_ns : 0.0);
     }
+    double operator()(const ParetoJitter& j) const {
+      return j.scale_ns * (std::pow(1.0 - random.uniform(), -1.0 / j.shape) - 1.0);
+    }
+    double operator()(const RecordedJitter& j) const {
+      return (*j.values_ns)[packet % j.values_ns->size()];
+    }
+    double operator()(const HistogramJitter& j) const {
+      const double pick = random.uniform();
+      const auto place = std::upper_bound(j.cumulative->begin(), j.cumulative->end(), pick);
+      const auto index = std::min<std::ptrdiff_t>(
+          place - j.cumulative->begin(), static_cast<std::ptrdiff_t>(j.values_ns->size()) - 1);
+      return (*j.values_ns)[static_cast<std::size_t>(index)];
+    }
   };
-  return std::visit(Draw{jitter_}, spec_.jitter);
-}
-
-double Link::queueing_ns(TrueTime now) {
-  if (!spec_.queueing) return 0.0;
-  const QueueingLoad& load = *spec_.queueing;
-  if (load.utilisation <= 0.0) return 0.0;
-  // A queue forgets within about service/(1 - utilisation)^2; starting empty this many of those ago
-  // is stationary.
-  constexpr double kWarmUp = 20.0;
-  const double idle = 1.0 - load.utilisation;
-  const double memory_ns = kWarmUp * load.service_ns / (idle * idle);
-  const double gap_ns = (now - load_time_).ns();
-  double remaining_ns = std::min(gap_ns, memory_ns);
-  if (gap_ns > memory_ns) work_ns_ = 0.0;
-  const double mean_gap_ns = load.service_ns / load.utilisation;
-  for (;;) {
-    const double next_ns = mean_gap_ns * load_.exponential();
-    if (next_ns >= remaining_ns) break;
-    remaining_ns -= next_ns;
-    work_ns_ = std::max(0.0, work_ns_ - next_ns) + load.service_ns;
-  }
-  work_ns_ = std::max(0.0, work_ns_ - remaining_ns);
-  load_time_ = now;
-  return work_ns_;
+  return std::visit(Draw{jitter_, first_packet_ + packets_++}, spec_.jitter);
 }
 
 double Link::burst_ns(TrueTime now) {
@@ -64,6 +65,24 @@ double Link::burst_ns(TrueTime now) {
   }
   const double extra = load_.exponential();
   return busy_ ? load.extra_mean_ns * extra : 0.0;
+}
+
+double Link::stall_ns(TrueTime arrival) {
+  if (!spec_.stalls) return 0.0;
+  while (arrival >= next_stall_) {
+    // Of stalls that overlap the host wakes up after the last.
+    if (next_stall_ > stall_end_) stall_begin_ = next_stall_;
+    const double length_ns = spec_.stalls->mean_length_ns * stall_.exponential();
+    stall_end_ = std::max(stall_end_, next_stall_ + Duration::from_ns(length_ns));
+    next_stall_ = next_stall_ + stall_gap();
+  }
+  const bool inside = arrival >= stall_begin_ && arrival < stall_end_;
+  return inside ? (stall_end_ - arrival).ns() : 0.0;
+}
+
+Duration Link::stall_gap() {
+  const double gap_ns = spec_.stalls->mean_interval_s * 1e9 * stall_.exponential();
+  return Duration::from_ns(std::max(gap_ns, 1.0));
 }
 
 bool Link::in_outage(TrueTime now) const noexcept {
@@ -82,8 +101,8 @@ Duration Link::fixed_delay_at(TrueTime t) const noexcept {
 
 Arrivals Link::send(TrueTime departure) {
   double noise_ns = jitter_ns();
-  noise_ns += queueing_ns(departure);
-  noise_ns += burst_ns(departure);
+  const double load_ns = queueing_.wait_ns(departure) + burst_ns(departure);
+  noise_ns += load_ns;
   const bool spike = fate_.chance(spec_.spikes.probability);
   const bool lost = fate_.chance(spec_.loss);
   const bool copied = fate_.chance(spec_.duplication);
@@ -94,12 +113,15 @@ Arrivals Link::send(TrueTime departure) {
   if (lost || in_outage(departure)) return {};
 
   TrueTime arrival = departure + std::max(delay, Duration{});
+  const double stall = stall_ns(arrival);
+  arrival = arrival + Duration::from_ns(stall);
   if (spec_.in_order) arrival = std::max(arrival, last_arrival_);
   last_arrival_ = std::max(last_arrival_, arrival);
   Arrivals arrivals;
   arrivals.times[0] = arrival;
   arrivals.times[1] = arrival + spec_.duplicate_lag;
   arrivals.count = copied ? 2 : 1;
+  arrivals.clean = load_ns == 0.0 && !spike && !held && stall == 0.0;
   return arrivals;
 }
 

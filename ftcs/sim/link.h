@@ -2,11 +2,14 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
 
+#include "ftcs/sim/queueing.h"
 #include "ftcs/sim/random.h"
 #include "ftcs/sim/true_time.h"
 
@@ -32,16 +35,25 @@ struct BimodalJitter {
   double extra_ns = 0.0;
   double sigma_ns = 0.0;
 };
-using Jitter =
-    std::variant<NoJitter, GaussianJitter, ExponentialJitter, GammaJitter, BimodalJitter>;
-
-/// A store-and-forward hop whose line is shared: Poisson arrivals of packets of one service time
-/// occupy a share `utilisation` of it (M/D/1). What our packet waits is the work it finds
-/// (Lindley's recursion), so that packets close together wait alike. Valid: 0 <= utilisation < 1.
-struct QueueingLoad {
-  double utilisation = 0.0;
-  double service_ns = 12'000.0;  ///< a full Ethernet frame at 1 Gbit/s
+/// A heavy tail (Lomax): P(extra > x) = (1 + x/scale)^-shape. The mean is scale / (shape - 1) for
+/// shape > 1; access to a radio channel is like this.
+struct ParetoJitter {
+  double shape = 2.0;
+  double scale_ns = 0.0;
 };
+/// Delays that somebody measured: packet n takes values[(start + n) mod size], so that what belongs
+/// together in the record stays together; the seed chooses the start.
+struct RecordedJitter {
+  std::shared_ptr<const std::vector<double>> values_ns;
+};
+/// Independent draws from a table: value k with a probability in proportion to weights[k].
+struct HistogramJitter {
+  std::shared_ptr<const std::vector<double>> values_ns;
+  std::shared_ptr<const std::vector<double>> cumulative;  ///< ascending, the last one is 1
+};
+using Jitter = std::variant<NoJitter, GaussianJitter, ExponentialJitter, GammaJitter, BimodalJitter,
+                            ParetoJitter, RecordedJitter, HistogramJitter>;
+
 /// Load in bursts: exponentially distributed idle and busy times; while busy each packet takes an
 /// exponential extra delay.
 struct BurstyLoad {
@@ -53,6 +65,13 @@ struct BurstyLoad {
 struct Spikes {
   double probability = 0.0;
   double extra_ns = 0.0;
+};
+/// The receiving host stands still at Poisson instants: a message that falls into a stall is
+/// stamped at its end (software stamps on a busy machine). Exponential lengths.
+struct HostStalls {
+  double mean_interval_s = 1.0;  ///< from one stall's begin to the next one's
+  double mean_length_ns = 0.0;
+  bool shared = false;  ///< one host takes the stamps of both directions: the same stalls for both
 };
 /// From `at` on the delay is `extra` longer (or shorter).
 struct DelayStep {
@@ -72,6 +91,7 @@ struct LinkSpec {
   std::optional<QueueingLoad> queueing;
   std::optional<BurstyLoad> bursts;
   Spikes spikes{};
+  std::optional<HostStalls> stalls;
   double loss = 0.0;         ///< probability
   double duplication = 0.0;  ///< probability that a second copy arrives, later by `duplicate_lag`
   Duration duplicate_lag = Nanoseconds{1'000};
@@ -86,6 +106,7 @@ struct LinkSpec {
 struct Arrivals {
   std::array<TrueTime, 2> times{};
   int count = 0;
+  bool clean = true;  ///< nothing but jitter: no queue, burst, spike or stall was met
 };
 
 /// A link in use. Every packet draws the same kinds of numbers in the same order, lost or not, so
@@ -102,18 +123,24 @@ class Link {
 
  private:
   [[nodiscard]] double jitter_ns();
-  [[nodiscard]] double queueing_ns(TrueTime now);
   [[nodiscard]] double burst_ns(TrueTime now);
+  [[nodiscard]] double stall_ns(TrueTime arrival);
+  [[nodiscard]] Duration stall_gap();
   [[nodiscard]] bool in_outage(TrueTime now) const noexcept;
 
   LinkSpec spec_;
+  QueueingPath queueing_;
   RandomStream jitter_;
   RandomStream load_;
   RandomStream fate_;
-  TrueTime load_time_{};     ///< when work_ns_ was current
-  double work_ns_ = 0.0;     ///< unfinished work in the queue
-  bool busy_ = false;        ///< state of the bursty load
-  TrueTime burst_change_{};  ///< when it changes next
+  RandomStream stall_;
+  std::size_t packets_ = 0;
+  std::size_t first_packet_ = 0;  ///< of a recorded jitter
+  bool busy_ = false;             ///< state of the bursty load
+  TrueTime burst_change_{};       ///< when it changes next
+  TrueTime stall_begin_{};
+  TrueTime stall_end_{};  ///< of the latest stall that has begun
+  TrueTime next_stall_{};
   TrueTime last_arrival_{};
 };
 

@@ -85,6 +85,10 @@ class TwoWayRun {
     return Duration::from_ns(std::pow(spec_.interval_spread, exponent) * spec_.interval.ns());
   }
 
+  [[nodiscard]] bool is_heard(const Arrivals& arrivals) const noexcept {
+    return arrivals.count > 0 && (arrivals.clean || !spec_.clean_only);
+  }
+
   void begin_cycle(std::size_t index) {
     const double request_share = timing_[index].uniform();
     const Duration interval = draw_interval(index);
@@ -93,7 +97,7 @@ class TwoWayRun {
     const Arrivals arrivals = chain_.node(index).forward.send(now_);
     // The first copy alone: a PTP port takes each sequenceId once. run_ptp_network has the port
     // itself.
-    if (arrivals.count > 0) {
+    if (is_heard(arrivals)) {
       queue_.schedule(arrivals.times[0], {EventKind::kSyncArrives, index, pair});
     }
     if (spec_.two_way) {
@@ -108,7 +112,7 @@ class TwoWayRun {
     const EventPair pair{Direction::kBackward, ReferenceTime{}, sender.stamp(now_)};
     const Arrivals arrivals = sender.backward.send(now_);
     // A request that arrives twice is answered twice; the receiver takes the first answer.
-    if (arrivals.count == 0) return;
+    if (!is_heard(arrivals)) return;
     queue_.schedule(arrivals.times[0], {EventKind::kRequestArrives, index, pair});
   }
 

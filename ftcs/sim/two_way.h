@@ -45,6 +45,9 @@ struct TwoWaySpec {
   bool random_phase = true;   ///< t0 uniform in one interval; false: t0 = 0
   bool two_way = true;        ///< false: no delay requests
   bool peer_to_peer = false;  ///< run_ptp_network: Pdelay exchanges with the neighbour instead
+  /// The discipline hears only messages that met nothing but jitter: what an oracle would hear that
+  /// knows which ones waited. The packets are the same.
+  bool clean_only = false;
   std::uint64_t cycles = 0;
   int truth_per_cycle = 8;  ///< how often the truth is looked at
   std::vector<ReferenceStep> reference_steps;
