@@ -119,8 +119,9 @@ void add_compare_command(CLI::App& app, int& exit_code) {
       "compare", "All servos on the same packets, ranked against the Kalman bound");
   auto* file = command->add_option("FILE", options->file,
                                    "scenario (TOML); default: gaussian 100 ns at 1 s");
-  auto* suite = command->add_option("--suite", options->suite,
-                                    "all scenario files of a folder, or a built-in suite: peers");
+  auto* suite =
+      command->add_option("--suite", options->suite,
+                          "all scenario files of a folder, or a built-in suite: peers, networks");
   suite->excludes(file);
   auto* log = command->add_option(
       "--log", options->log,

@@ -56,7 +56,7 @@ void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
     if (!options.medians_only) continue;
     for (auto& limit : scenario.limits) {
       for (auto& figure : limit.figures)
-        figure.worst = figure.within = experiment::FigureLimit::kNoLimit;
+        figure.worst = figure.within = figure.worst_of_bound = experiment::FigureLimit::kNoLimit;
     }
   }
 }

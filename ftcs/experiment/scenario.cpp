@@ -113,6 +113,9 @@ FigureLimit read_figure_limit(TomlTable bounds, const FigureName& figure) {
   limit.worst = bound("worst");
   limit.within = bound("within");
   limit.least = bound("least");
+  constexpr Range kFactor{1e-3, 1e6};
+  limit.median_of_bound = bounds.number("median_of_bound", kFactor).value_or(FigureLimit::kNoLimit);
+  limit.worst_of_bound = bounds.number("worst_of_bound", kFactor).value_or(FigureLimit::kNoLimit);
   if (bounds.has("share")) limit.share = bounds.ratio("share", {0.0, 1.0}).value_or(1.0);
   if (limit.within == limit.within && !(limit.share == limit.share)) {
     bounds.fail("within", "within needs a share", "for example share = \"95 %\"");
@@ -130,11 +133,20 @@ void read_limits(TomlTable& root, Scenario& scenario) {
     const bool known = std::any_of(scenario.servos.begin(), scenario.servos.end(),
                                    [&](const ScenarioServo& s) { return s.name == *servo; });
     if (!known) table.fail("servo", fmt::format("the scenario has no servo \"{}\"", *servo));
+    const bool has_bound = std::any_of(scenario.servos.begin(), scenario.servos.end(),
+                                       [](const ScenarioServo& s) { return is_bound(s.name); });
     limit.required = table.boolean("required").value_or(true);
     limit.note = table.text("note").value_or("");
     for (const FigureName& figure : figure_names()) {
       if (auto bounds = table.table(figure.name)) {
         limit.figures.push_back(read_figure_limit(std::move(*bounds), figure));
+        const FigureLimit& read = limit.figures.back();
+        const bool relative = read.median_of_bound == read.median_of_bound ||
+                              read.worst_of_bound == read.worst_of_bound;
+        if (relative && !has_bound) {
+          table.fail(figure.name, "a limit of the bound needs a world that has one",
+                     "[bound] sets its noise");
+        }
       }
     }
     table.finish();

@@ -38,7 +38,9 @@ struct FigureLimit {
   double worst = kNoLimit;
   double within = kNoLimit;  ///< ... in at least `share` of the runs
   double share = kNoLimit;
-  double least = kNoLimit;  ///< of the median, from below
+  double least = kNoLimit;            ///< of the median, from below
+  double median_of_bound = kNoLimit;  ///< median over the median of the bound (or oracle)
+  double worst_of_bound = kNoLimit;   ///< worst over the worst of the bound
 
   static constexpr double kNoLimit = std::numeric_limits<double>::quiet_NaN();
 };

@@ -54,7 +54,7 @@ SweepResult empty_result(const std::vector<Scenario>& scenarios) {
   return result;
 }
 
-void judge_figure(const FigureLimit& limit, ServoResult& servo) {
+void judge_figure(const FigureLimit& limit, const ServoResult* bound_row, ServoResult& servo) {
   const auto figure = limit.figure->figure;
   const auto add = [&](const char* kind, double bound, double measured, bool passed) {
     servo.limits.push_back({std::string(limit.figure->name), kind, bound, measured, passed});
@@ -75,6 +75,15 @@ void judge_figure(const FigureLimit& limit, ServoResult& servo) {
   if (!std::isnan(limit.least)) {
     const double median = servo.median(figure);
     add("least", limit.least, median, median >= limit.least);
+  }
+  if (bound_row == nullptr) return;
+  if (!std::isnan(limit.median_of_bound)) {
+    const double factor = servo.median(figure) / bound_row->median(figure);
+    add("median of bound", limit.median_of_bound, factor, factor <= limit.median_of_bound);
+  }
+  if (!std::isnan(limit.worst_of_bound)) {
+    const double factor = servo.worst(figure) / bound_row->worst(figure);
+    add("worst of bound", limit.worst_of_bound, factor, factor <= limit.worst_of_bound);
   }
 }
 
@@ -119,6 +128,9 @@ RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo, st
 }
 
 void judge(const Scenario& scenario, ScenarioResult& result) {
+  const auto bound = std::find_if(result.servos.begin(), result.servos.end(),
+                                  [](const ServoResult& servo) { return is_bound(servo.servo); });
+  const ServoResult* const bound_row = bound == result.servos.end() ? nullptr : &*bound;
   for (ServoResult& servo : result.servos) {
     servo.limits.clear();
     servo.passed = true;
@@ -127,7 +139,7 @@ void judge(const Scenario& scenario, ScenarioResult& result) {
       servo.has_limits = true;
       servo.required = servo.required || limit.required;
       servo.note = limit.note;
-      for (const FigureLimit& figure : limit.figures) judge_figure(figure, servo);
+      for (const FigureLimit& figure : limit.figures) judge_figure(figure, bound_row, servo);
     }
   }
 }

@@ -51,6 +51,11 @@ std::optional<ScenarioServo> named_servo(const std::string& name, const Scenario
     servo.config.ftcs.offset_gain = 1.0;
     return servo;
   }
+  if (name == "minimum-window") {
+    ScenarioServo servo{name, default_config(ServoKind::kMinimumDelay, scenario)};
+    servo.config.minimum_delay.selection = DelaySelection::kWindow;
+    return servo;
+  }
   const auto kind = servo_kind_from_name(name);
   if (!kind) return std::nullopt;
   return ScenarioServo{name, default_config(*kind, scenario)};
@@ -65,7 +70,7 @@ const std::vector<std::string>& all_servos() {
 }
 
 std::string known_names() {
-  std::string names = "ftcs-p1";
+  std::string names = "ftcs-p1, minimum-window";
   for (const ServoKindName& entry : kServoKinds) names += ", " + std::string(entry.name);
   return names;
 }
@@ -110,6 +115,12 @@ void read_parameters(TomlTable& table, ServoConfig& config) {
   }
   if (const auto v = table.number("derivative_gain", kGain)) config.pid.derivative_gain = *v;
   if (const auto v = table.boolean("gate")) config.two_way.gate_enabled = *v;
+  if (const auto v = table.integer("window", {1.0, 4096.0}))
+    config.minimum_delay.window = static_cast<std::uint32_t>(*v);
+  if (const auto v = table.word("selection", {"weights", "window"})) {
+    config.minimum_delay.selection =
+        *v == "window" ? DelaySelection::kWindow : DelaySelection::kWeights;
+  }
   read_kalman_noise(table, config.kalman.noise);
 }
 

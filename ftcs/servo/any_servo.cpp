@@ -69,6 +69,8 @@ std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
       return validate(with_common(config.frequency_compensated, config));
     case ServoKind::kKalman:
       return validate(with_common(config.kalman, config));
+    case ServoKind::kMinimumDelay:
+      return validate(with_common(config.minimum_delay, config));
   }
   return std::nullopt;
 }
@@ -98,6 +100,9 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
                       with_common(config.frequency_compensated, config)};
     case ServoKind::kKalman:
       return AnyServo{std::in_place_type<KalmanServo>, with_common(config.kalman, config)};
+    case ServoKind::kMinimumDelay:
+      return AnyServo{std::in_place_type<MinimumDelayServo>,
+                      with_common(config.minimum_delay, config)};
     case ServoKind::kFreeRunning:
       break;
   }

@@ -10,6 +10,7 @@
 #include "ftcs/servo/adaptive/adaptive_servo.h"
 #include "ftcs/servo/baseline/frequency_compensated_servo.h"
 #include "ftcs/servo/baseline/kalman_servo.h"
+#include "ftcs/servo/baseline/minimum_delay_servo.h"
 #include "ftcs/servo/baseline/pid_servo.h"
 #include "ftcs/servo/baseline/regression_servo.h"
 #include "ftcs/servo/free_running_servo.h"
@@ -25,7 +26,7 @@ namespace ftcs {
 // A further servo needs one line in each of: ServoKind, kServoKinds, ServoConfig, AnyServo::Variant
 // and, in any_servo.cpp, make_servo and validate.
 
-/// The last four are baselines for comparison.
+/// The last five are baselines for comparison.
 enum class ServoKind : std::uint8_t {
   kFtcs,
   kPics,
@@ -36,6 +37,7 @@ enum class ServoKind : std::uint8_t {
   kPid,
   kFrequencyCompensated,
   kKalman,
+  kMinimumDelay,
 };
 
 struct ServoKindName {
@@ -49,7 +51,7 @@ inline constexpr ServoKindName kServoKinds[] = {
     {ServoKind::kPics, "pics"},         {ServoKind::kLinuxptpPi, "linuxptp-pi"},
     {ServoKind::kFreeRunning, "none"},  {ServoKind::kRegression, "regression"},
     {ServoKind::kPid, "pid"},           {ServoKind::kFrequencyCompensated, "frequency-compensated"},
-    {ServoKind::kKalman, "kalman"},
+    {ServoKind::kKalman, "kalman"},     {ServoKind::kMinimumDelay, "minimum-delay"},
 };
 
 [[nodiscard]] std::string_view servo_kind_name(ServoKind kind) noexcept;
@@ -72,6 +74,7 @@ struct ServoConfig {
   PidConfig pid{};
   FrequencyCompensatedConfig frequency_compensated{};
   KalmanConfig kalman{};
+  MinimumDelayConfig minimum_delay{};
 };
 
 /// Of the chosen kind only.
@@ -83,7 +86,8 @@ class AnyServo {
   using Variant =
       std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>, TwoWayServo<LinuxptpPiServo>,
                    TwoWayServo<FreeRunningServo>, AdaptiveServo, TwoWayServo<RegressionServo>,
-                   TwoWayServo<PidServo>, TwoWayServo<FrequencyCompensatedServo>, KalmanServo>;
+                   TwoWayServo<PidServo>, TwoWayServo<FrequencyCompensatedServo>, KalmanServo,
+                   MinimumDelayServo>;
 
   /// In place: the adaptive servo is too large to pass through the stack of a real-time thread.
   template <class Servo, class... Configs>

@@ -20,6 +20,7 @@ enum class ServoConfigError : std::uint8_t {
   kNoise,
   kActuator,
   kLearntState,
+  kWindow,
 };
 
 /// One sentence: what was expected.
@@ -49,6 +50,8 @@ enum class ServoConfigError : std::uint8_t {
       return "latency, granularity and largest rate change must be finite and not negative";
     case ServoConfigError::kLearntState:
       return "a learnt state needs a rate within 50 % of nominal, deviation and noise above zero";
+    case ServoConfigError::kWindow:
+      return "a window must hold 1 to 4096 exchanges";
   }
   return "unknown configuration error";
 }
