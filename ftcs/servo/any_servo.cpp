@@ -23,13 +23,13 @@ AdaptiveConfig with_common(AdaptiveConfig servo, const ServoConfig& common) noex
   return servo;
 }
 
-KalmanConfig with_common(KalmanConfig servo, const ServoConfig& common) noexcept {
-  if (common.sync_interval != Nanoseconds{0}) servo.sync_interval = common.sync_interval;
+/// Of servos that hear both directions themselves and may be told the delay instead.
+template <class PairServoConfig>
+PairServoConfig with_delay(PairServoConfig servo, const ServoConfig& common) noexcept {
   if (!servo.fixed_path_delay.has_value()) {
     servo.fixed_path_delay = common.two_way.fixed_path_delay;
   }
-  servo.limits = intersect(servo.limits, common.limits);
-  return servo;
+  return with_common(servo, common);
 }
 
 }  // namespace
@@ -68,9 +68,9 @@ std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
     case ServoKind::kFrequencyCompensated:
       return validate(with_common(config.frequency_compensated, config));
     case ServoKind::kKalman:
-      return validate(with_common(config.kalman, config));
+      return validate(with_delay(config.kalman, config));
     case ServoKind::kMinimumDelay:
-      return validate(with_common(config.minimum_delay, config));
+      return validate(with_delay(config.minimum_delay, config));
   }
   return std::nullopt;
 }
@@ -99,10 +99,10 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
       return AnyServo{std::in_place_type<TwoWayServo<FrequencyCompensatedServo>>, two_way,
                       with_common(config.frequency_compensated, config)};
     case ServoKind::kKalman:
-      return AnyServo{std::in_place_type<KalmanServo>, with_common(config.kalman, config)};
+      return AnyServo{std::in_place_type<KalmanServo>, with_delay(config.kalman, config)};
     case ServoKind::kMinimumDelay:
       return AnyServo{std::in_place_type<MinimumDelayServo>,
-                      with_common(config.minimum_delay, config)};
+                      with_delay(config.minimum_delay, config)};
     case ServoKind::kFreeRunning:
       break;
   }

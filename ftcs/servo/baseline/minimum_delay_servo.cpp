@@ -44,7 +44,11 @@ void MinimumDelayServo::add_exchange(const Stamp& forward, const Stamp& backward
   const double middle = 0.5 * (forward.x + backward.x);
   const double f = forward.y + slope_ * (middle - forward.x);
   const double b = backward.y + slope_ * (middle - backward.x);
-  points_[count_ % kPoints] = {middle, 0.5 * (f + b), 0.5 * (f - b)};
+  add_point({middle, 0.5 * (f + b), 0.5 * (f - b)});
+}
+
+void MinimumDelayServo::add_point(const Point& point) noexcept {
+  points_[count_ % kPoints] = point;
   ++count_;
   const std::size_t most = config_.selection == DelaySelection::kWindow ? kWindowPoints : kPoints;
   length_ = std::min(length_ + 1, most);
@@ -143,27 +147,38 @@ ServoUpdate MinimumDelayServo::steer(const ClockReading& now) noexcept {
            config_.limits.clamp(tracking), Duration{}}};
 }
 
-ServoUpdate MinimumDelayServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
-  const SampleVerdict order = check_order(pair);
-  if (order != SampleVerdict::kUsed) return {order, false, {}};
-  if (!started_) first_ = pair;
-  started_ = true;
+/// True when the message completed something to fit.
+bool MinimumDelayServo::add(const TimestampPair& pair) noexcept {
   const Stamp stamp = stamp_of(pair);
-  if (pair.direction == Direction::kForward) {
+  const bool forward = pair.direction == Direction::kForward;
+  if (config_.fixed_path_delay) {
+    if (!forward) return false;
+    const auto delay = static_cast<double>(config_.fixed_path_delay->count());
+    add_point({stamp.x, stamp.y - delay, delay});
+  } else if (forward) {
     forward_ = stamp;
-    return {};
-  }
-  if (!forward_) return {};
-  interval_ns_ = config_.sync_interval > Nanoseconds{0}
-                     ? static_cast<double>(config_.sync_interval.count())
-                     : std::max(stamp.x - last_x_, 1.0);
-  last_x_ = stamp.x;
-  if (config_.selection == DelaySelection::kWindow) {
+    return false;
+  } else if (!forward_) {
+    return false;
+  } else if (config_.selection == DelaySelection::kWindow) {
     add_to_window(*forward_, stamp);
   } else {
     add_exchange(*forward_, stamp);
   }
   forward_.reset();
+  interval_ns_ = config_.sync_interval > Nanoseconds{0}
+                     ? static_cast<double>(config_.sync_interval.count())
+                     : std::max(stamp.x - last_x_, 1.0);
+  last_x_ = stamp.x;
+  return true;
+}
+
+ServoUpdate MinimumDelayServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
+  const SampleVerdict order = check_order(pair);
+  if (order != SampleVerdict::kUsed) return {order, false, {}};
+  if (!started_) first_ = pair;
+  started_ = true;
+  if (!add(pair)) return {};
   fit();
   return fitted_ ? steer(now) : ServoUpdate{};
 }

@@ -20,6 +20,8 @@ enum class DelaySelection : std::uint8_t {
 struct MinimumDelayConfig {
   Nanoseconds sync_interval{0};  ///< zero: the time between the last two exchanges
   RateLimits limits{};
+  /// Known otherwise: every forward message is a point, there is nothing to choose by.
+  std::optional<Nanoseconds> fixed_path_delay{};
   DelaySelection selection = DelaySelection::kWeights;
   std::uint32_t window = 32;  ///< of kWindow, 1 to 4096 exchanges
 };
@@ -61,6 +63,8 @@ class MinimumDelayServo {
 
   [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
   [[nodiscard]] Stamp stamp_of(const TimestampPair& pair) const noexcept;
+  [[nodiscard]] bool add(const TimestampPair& pair) noexcept;
+  void add_point(const Point& point) noexcept;
   void add_exchange(const Stamp& forward, const Stamp& backward) noexcept;
   void add_to_window(const Stamp& forward, const Stamp& backward) noexcept;
   void fit() noexcept;
