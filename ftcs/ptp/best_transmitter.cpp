@@ -92,6 +92,13 @@ std::optional<FreeRunningTime> ForeignTransmitters::receipt_timeout(const PortId
   return record->last + multiply(record->announce_interval, intervals);
 }
 
+std::optional<FreeRunningTime> ForeignTransmitters::last_heard(
+    const PortIdentity& port) const noexcept {
+  const Record* const record = find(port);
+  if (record == nullptr) return std::nullopt;
+  return record->last;
+}
+
 void ForeignTransmitters::forget(const PortIdentity& port) noexcept {
   for (Record& record : records_) {
     if (record.used && record.data.port == port) record = Record{};

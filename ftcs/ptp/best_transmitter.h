@@ -41,6 +41,9 @@ class ForeignTransmitters {
   [[nodiscard]] std::optional<FreeRunningTime> receipt_timeout(const PortIdentity& port,
                                                                int intervals) const noexcept;
 
+  /// None: not in the table.
+  [[nodiscard]] std::optional<FreeRunningTime> last_heard(const PortIdentity& port) const noexcept;
+
   void forget(const PortIdentity& port) noexcept;
   void clear() noexcept { records_ = {}; }
 

@@ -15,7 +15,10 @@ DelayRequests::DelayRequests(std::int8_t log_interval, std::uint64_t seed) noexc
 
 void DelayRequests::start(FreeRunningTime now) noexcept {
   running_ = true;
-  next_at_ = now;
+  // A reference that jumps with each Sync would otherwise make each of them a request.
+  const bool at_once = !begun_at_once_ || now - *begun_at_once_ >= interval_;
+  if (at_once) begun_at_once_ = now;
+  next_at_ = at_once ? now : now + draw();
 }
 
 void DelayRequests::stop(Counters& counters) noexcept {
@@ -66,12 +69,14 @@ void DelayRequests::on_stamp_missing(std::uint16_t sequence_id, Counters& counte
 }
 
 std::optional<EventPair> DelayRequests::on_response(const Header& header, const DelayResp& response,
+                                                    FreeRunningTime now,
                                                     Counters& counters) noexcept {
   Request* const request = find(header.sequence_id);
   if (request == nullptr || request->answered) {
     counters.add(Counter::kStaleDelayResp);
     return std::nullopt;
   }
+  honour(header.log_interval, now, counters);
   request->answered = true;
   request->receive = response.receive - header.correction;
   return complete(*request, counters);
@@ -94,7 +99,8 @@ std::optional<EventPair> DelayRequests::complete(Request& request, Counters& cou
 void DelayRequests::honour(std::int8_t log_interval, FreeRunningTime now,
                            Counters& counters) noexcept {
   if (log_interval == kNoLogInterval) return;
-  const auto interval = interval_from_log(log_interval);
+  auto interval = interval_from_log(log_interval);
+  if (log_interval > kLongestDemandedLogInterval) interval.reset();
   if (!interval) {
     counters.add(Counter::kBadInterval);
     return;

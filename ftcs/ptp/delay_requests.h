@@ -19,10 +19,12 @@ namespace ftcs::ptp {
 /// their requests.
 class DelayRequests {
  public:
+  static constexpr std::int8_t kLongestDemandedLogInterval = 5;
+
   DelayRequests(std::int8_t log_interval, std::uint64_t seed) noexcept;
 
-  /// The first request is due at once; further ones after random intervals, uniform in [0, 2 x
-  /// interval] (9.5.11.2).
+  /// The first request is due at once, unless one was for that reason within the last interval;
+  /// further ones after random intervals, uniform in [0, 2 x interval] (9.5.11.2).
   void start(FreeRunningTime now) noexcept;
   /// Forgets all open requests. Sequence ids go on, so that late answers find nothing.
   void stop(Counters& counters) noexcept;
@@ -37,10 +39,10 @@ class DelayRequests {
                                    Counters& counters) noexcept;
   /// The stamp is overdue, which is counted; one that comes later is used all the same.
   void on_stamp_missing(std::uint16_t sequence_id, Counters& counters) noexcept;
+  /// The answer to an open request also tells logMinDelayReqInterval as the transmitter demands it
+  /// (7.7.2.4, 13.3.2.14); more than kLongestDemandedLogInterval, nobody does.
   std::optional<EventPair> on_response(const Header& header, const DelayResp& response,
-                                       Counters& counters) noexcept;
-  /// logMinDelayReqInterval as the transmitter demands it in Delay_Resp (7.7.2.4, 13.3.2.14).
-  void honour(std::int8_t log_interval, FreeRunningTime now, Counters& counters) noexcept;
+                                       FreeRunningTime now, Counters& counters) noexcept;
   [[nodiscard]] Duration interval() const noexcept { return interval_; }
 
  private:
@@ -56,6 +58,7 @@ class DelayRequests {
   /// Random intervals may be short against the round trip.
   static constexpr std::size_t kOpenRequests = 4;
 
+  void honour(std::int8_t log_interval, FreeRunningTime now, Counters& counters) noexcept;
   [[nodiscard]] Request* find(std::uint16_t sequence_id) noexcept;
   std::optional<EventPair> complete(Request& request, Counters& counters) noexcept;
   void forget(Request& request, Counters& counters) noexcept;
@@ -67,6 +70,7 @@ class DelayRequests {
   std::uint16_t emitted_id_ = 0;
   bool running_ = false;
   FreeRunningTime next_at_{};
+  std::optional<FreeRunningTime> begun_at_once_{};
   Duration interval_;
   Random random_;
 };

@@ -27,6 +27,7 @@ std::optional<EventPair> SyncMatcher::on_sync(const Header& header, const Sync& 
   const bool follow_up_waits = slot != nullptr;
   if (!follow_up_waits) slot = &take_slot(header.sequence_id, now, counters);
   slot->received = received;
+  slot->overtaken = overtaken_;
   slot->correction += header.correction;
   if (!header.has(flag::kTwoStep)) {
     slot->origin = sync.origin;
@@ -67,32 +68,65 @@ bool SyncMatcher::admit_sync(std::uint16_t sequence_id, FreeRunningTime now,
                              Counters& counters) noexcept {
   const int distance = sequence_distance(sequence_id, newest_id_);
   const bool quiet = now - newest_at_ > Duration{kMatchTimeout};
-  if (has_newest_ && distance <= 0 && distance > -kReorderWindow && !quiet) {
+  const bool next = distance > 0 && distance <= kReorderWindow;
+  const bool behind = distance <= 0 && distance > -kReorderWindow;
+  const int run = follow_run(sequence_id, next, now);
+  const bool goes_on = run >= (behind ? kOvertakenSyncs : kRestartSyncs);
+  if (has_newest_ && !next && !quiet && !goes_on) {
     counters.add(Counter::kStaleSync);
     return false;
   }
-  if (has_newest_ && (distance <= 0 || distance > kReorderWindow)) {
+  if (has_newest_ && !next) {
     counters.add(Counter::kSequenceRestarts);
     for (Slot& slot : slots_) release(slot, counters);
     has_emitted_ = false;
   } else if (has_newest_) {
     counters.add(Counter::kMissedSync, static_cast<std::uint64_t>(distance - 1));
   }
+  if (quiet) admitted_ = {};
+  overtaken_ = has_newest_ && !quiet && (behind || (next && overtaken_));
+  gap_ = has_newest_ && !quiet ? now - newest_at_ : Duration{};
   has_newest_ = true;
   newest_id_ = sequence_id;
   newest_at_ = now;
+  admitted_[sequence_id % kRemembered] = sequence_id;
   return true;
+}
+
+bool SyncMatcher::was_admitted(std::uint16_t sequence_id) const noexcept {
+  return admitted_[sequence_id % kRemembered] == sequence_id;
+}
+
+/// How many successive Syncs this one ends, if they began with an unexpected id. An id that has
+/// come before is a copy, unless it is the next one of a long run: then somebody else has used it.
+int SyncMatcher::follow_run(std::uint16_t sequence_id, bool next, FreeRunningTime now) noexcept {
+  constexpr int kLargestGap = 4;
+  const Duration longest = gap_ + gap_ + gap_ + gap_;
+  const bool paced = longest <= Duration{} || now - run_at_ <= longest;
+  const int ahead = sequence_distance(sequence_id, run_id_);
+  const bool goes_on = run_ > 0 && paced && ahead > 0 && ahead <= kLargestGap;
+  const bool copy = was_admitted(sequence_id) && !(goes_on && run_ == kOvertakenSyncs);
+  if (copy || (next && !goes_on)) return 0;
+  run_ = goes_on ? std::min(run_ + 1, kOvertakenSyncs) : 1;
+  run_id_ = sequence_id;
+  run_at_ = now;
+  return run_;
 }
 
 std::optional<EventPair> SyncMatcher::complete(Slot& slot, Counters& counters) noexcept {
   slot.state = SlotState::kDone;
-  if (has_emitted_ && sequence_distance(slot.sequence_id, emitted_id_) <= 0) {
+  const ReferenceTime reference = slot.origin + slot.correction;
+  // What disorder has overtaken is told by its time, whatever the ids say.
+  const bool disorder =
+      slot.overtaken && reference <= emitted_ && emitted_ - reference < Duration{kMatchTimeout};
+  if (disorder || (has_emitted_ && sequence_distance(slot.sequence_id, emitted_id_) <= 0)) {
     counters.add(Counter::kStaleFollowUp);
     return std::nullopt;
   }
   has_emitted_ = true;
   emitted_id_ = slot.sequence_id;
-  return EventPair{Direction::kForward, slot.origin + slot.correction, slot.received};
+  emitted_ = reference;
+  return EventPair{Direction::kForward, reference, slot.received};
 }
 
 SyncMatcher::Slot* SyncMatcher::find(std::uint16_t sequence_id) noexcept {

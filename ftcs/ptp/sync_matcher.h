@@ -25,8 +25,14 @@ class SyncMatcher {
   static constexpr Nanoseconds kMatchTimeout{1'000'000'000};
   /// No network delivers a copy so late, and no program is started again so soon.
   static constexpr Nanoseconds kLatestCopy{100'000'000};
-  /// Sequence ids this close are reordering or loss; further apart, the transmitter has restarted.
+  /// Sequence ids up to so far ahead are the next ones, after loss.
   static constexpr int kReorderWindow = 16;
+  /// Any other id is a transmitter that has been started again once so many successive ones have
+  /// come, each new and none later than four gaps of the Syncs before. One alone is a stray or a
+  /// replay. Ids a little behind may also be disorder: those need more, and are then a transmitter
+  /// whose ids somebody else pushes ahead.
+  static constexpr int kRestartSyncs = 3;
+  static constexpr int kOvertakenSyncs = 8;
 
   /// `received` is t2; `now`, when we handle the message. A one-step Sync is a pair by itself.
   std::optional<EventPair> on_sync(const Header& header, const Sync& sync, FreeRunningTime received,
@@ -44,12 +50,16 @@ class SyncMatcher {
     FreeRunningTime received{};
     ReferenceTime origin{};
     Duration correction{};
+    bool overtaken = false;  ///< admitted although a newer id had come, or after such a one
   };
+  static constexpr std::size_t kRemembered = 256;  // at 128 Hz two seconds
   /// Four Syncs may be under way at once.
   static constexpr std::size_t kSlots = 4;
 
   [[nodiscard]] bool admit_sync(std::uint16_t sequence_id, FreeRunningTime now,
                                 Counters& counters) noexcept;
+  int follow_run(std::uint16_t sequence_id, bool next, FreeRunningTime now) noexcept;
+  [[nodiscard]] bool was_admitted(std::uint16_t sequence_id) const noexcept;
   [[nodiscard]] Slot* find(std::uint16_t sequence_id) noexcept;
   [[nodiscard]] Slot& take_slot(std::uint16_t sequence_id, FreeRunningTime now,
                                 Counters& counters) noexcept;
@@ -61,8 +71,16 @@ class SyncMatcher {
   bool has_newest_ = false;
   std::uint16_t newest_id_ = 0;  ///< of the Syncs admitted
   FreeRunningTime newest_at_{};
+  Duration gap_{};  ///< between the last two admitted
+  /// The latest ids admitted, each at its place modulo their number.
+  std::array<std::optional<std::uint16_t>, kRemembered> admitted_{};
+  int run_ = 0;  ///< successive ones that began with an unexpected id, up to run_id_
+  std::uint16_t run_id_ = 0;
+  FreeRunningTime run_at_{};
   bool has_emitted_ = false;
   std::uint16_t emitted_id_ = 0;
+  ReferenceTime emitted_{};
+  bool overtaken_ = false;  ///< the newest
 };
 
 }  // namespace ftcs::ptp

@@ -125,6 +125,7 @@ class TimeReceiver {
   [[nodiscard]] bool usable_source(const Header& header) noexcept;
   [[nodiscard]] bool from_transmitter(const Message& message, FreeRunningTime now) noexcept;
   [[nodiscard]] bool usable_correction(const Header& header) noexcept;
+  [[nodiscard]] Duration believed_interval(const Header& header, FreeRunningTime now) noexcept;
   void on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
                    ActionList& actions) noexcept;
   void on_sync(const Header& header, const Sync& sync, const Input& input,

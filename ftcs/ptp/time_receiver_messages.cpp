@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a time receiver does with each message; its inputs, states and timers are in
 // time_receiver.cpp.
+#include <algorithm>
 #include <variant>
 
 #include "ftcs/ptp/interval.h"
@@ -11,6 +12,22 @@ namespace {
 
 /// 9.3.2.5: a data set that has come this far is worth nothing.
 constexpr std::uint16_t kMaximumStepsRemoved = 255;
+
+/// IEEE 802.1AS alone defines the information in Follow_Up (10.6.2.2.1 there).
+constexpr std::uint8_t kGptpSdoId = 1;
+
+/// 7.5.2: no clock has such an identity, and no port such a number.
+bool is_possible(const ClockIdentity& clock) noexcept {
+  const auto all = [&clock](std::uint8_t octet) {
+    return std::all_of(clock.octets.begin(), clock.octets.end(),
+                       [octet](std::uint8_t one) { return one == octet; });
+  };
+  return !all(0x00) && !all(0xFF);
+}
+
+bool is_possible(const PortIdentity& port) noexcept {
+  return is_possible(port.clock) && port.port != 0 && port.port != 0xFFFF;
+}
 
 /// 11.3.2: every Delay_Resp takes the fraction of its stamp off the correction. That is no finding.
 constexpr Duration kUsualNegativeCorrection{Nanoseconds{-1}};
@@ -92,23 +109,37 @@ bool TimeReceiver::usable_correction(const Header& header) noexcept {
   return true;
 }
 
+/// What a transmitter announces is believed up to eight times our own interval, and once it has
+/// been heard, up to twice the time between its Announces: two messages that promise the next one
+/// in minutes must not bind us so long to who never speaks again.
+Duration TimeReceiver::believed_interval(const Header& header, FreeRunningTime now) noexcept {
+  const Duration own =
+      interval_from_log(config_.log_announce_interval).value_or(Duration{std::chrono::seconds{1}});
+  const auto announced = interval_from_log(header.log_interval);
+  if (!announced) {
+    if (header.log_interval != kNoLogInterval) port_.count(Counter::kBadInterval);
+    return own;
+  }
+  constexpr int kLongestInOwn = 8;
+  const Duration believed = std::min(*announced, multiply(own, kLongestInOwn));
+  const auto last = foreign_.last_heard(header.source);
+  return last ? std::min(believed, std::max(own, multiply(now - *last, 2))) : believed;
+}
+
 void TimeReceiver::on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
                                ActionList& actions) noexcept {
   if (announce.steps_removed >= kMaximumStepsRemoved || header.source.clock == config_.port.clock ||
-      announce.grandmaster == config_.port.clock) {
+      announce.grandmaster == config_.port.clock || !is_possible(header.source) ||
+      !is_possible(announce.grandmaster)) {
     port_.count(Counter::kUnusableAnnounce);
     return;
   }
   port_.count(Counter::kAnnounceReceived);
-  auto interval = interval_from_log(header.log_interval);
-  if (!interval) {
-    if (header.log_interval != kNoLogInterval) port_.count(Counter::kBadInterval);
-    interval = interval_from_log(config_.log_announce_interval);
-  }
+  const Duration interval = believed_interval(header, now);
   TransmitterData data{header.source, announce, header.flags};
   data.announce.origin = {};  // differs in each message and says nothing about the transmitter
-  const auto heard = foreign_.hear(data, interval.value_or(Duration{std::chrono::seconds{1}}), now,
-                                   has_transmitter_ ? transmitter_.port : PortIdentity{});
+  const auto heard =
+      foreign_.hear(data, interval, now, has_transmitter_ ? transmitter_.port : PortIdentity{});
   if (heard == ForeignTransmitters::Heard::kTableFull) port_.count(Counter::kForeignTableFull);
   if (heard == ForeignTransmitters::Heard::kNew)
     port_.push(TransmitterSeen{header.source}, actions);
@@ -137,8 +168,9 @@ void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
                                 FreeRunningTime now, ActionList& actions) noexcept {
   if (!usable_correction(header)) return;
   port_.count(Counter::kFollowUpReceived);
-  follow_information(follow_up, actions);
-  emit(matcher_.on_follow_up(header, follow_up, now, port_.counters()), now, actions);
+  const auto pair = matcher_.on_follow_up(header, follow_up, now, port_.counters());
+  if (pair && config_.major_sdo_id == kGptpSdoId) follow_information(follow_up, actions);
+  emit(pair, now, actions);
 }
 
 /// 802.1AS-2020, 11.4.4.3: how fast the grandmaster is, by the sender's clock, by which the peer
@@ -161,8 +193,7 @@ void TimeReceiver::on_delay_resp(const Header& header, const DelayResp& response
   if (response.requesting_port != config_.port) return port_.count(Counter::kWrongRequestingPort);
   if (!usable_correction(header)) return;
   port_.count(Counter::kDelayRespReceived);
-  delay_requests_.honour(header.log_interval, now, port_.counters());
-  emit(delay_requests_.on_response(header, response, port_.counters()), now, actions);
+  emit(delay_requests_.on_response(header, response, now, port_.counters()), now, actions);
 }
 
 }  // namespace ftcs::ptp

@@ -193,6 +193,20 @@ TEST_F(GptpReceiver, is_told_of_jumps_that_it_could_not_see) {
   EXPECT_EQ(count(Counter::kReferenceJumps), 1U);
 }
 
+TEST_F(GptpReceiver, information_without_a_sync_is_not_believed) {
+  begin();
+  FollowUpInformation information;
+  static_cast<void>(informed_exchange(1, 3s, information));
+  information.gm_time_base_indicator = 1;
+  FollowUp body{reference(3s + 100ms)};
+  body.has_information = true;
+  body.information = information;
+  for (std::uint16_t id = 1; id <= 3; ++id) {
+    EXPECT_TRUE(
+        of<ReferenceJumped>(general(profile(message_from(kA, id, body)), 3s + 100ms)).empty());
+  }
+}
+
 TEST_F(GptpReceiver, a_transmitter_without_syncs_is_given_up_while_it_still_announces) {
   begin();
   static_cast<void>(informed_exchange(1, 3s, {}));

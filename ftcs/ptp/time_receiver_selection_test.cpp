@@ -152,5 +152,55 @@ TEST_F(Receiver, an_announce_interval_out_of_range_counts_as_the_configured_one)
   EXPECT_EQ(receiver_.deadline(), local(1s + 3 * 2s));
 }
 
+// Two frames, then silence: 385 s without a transmitter.
+TEST_F(Receiver, who_promises_the_next_announce_in_minutes_is_given_up_in_seconds) {
+  select_a();
+  Message rogue = announce_from(kB, 0);
+  rogue.header.log_interval = 7;
+  static_cast<void>(general(rogue, 1s));
+  static_cast<void>(general(rogue, 1100ms));
+  ASSERT_EQ(receiver_.transmitter()->port, kB);
+  static_cast<void>(general(announce_from(kA), 5s));
+  static_cast<void>(general(announce_from(kA), 6s));
+  static_cast<void>(receiver_.on_timer(local(7'200ms)));
+  ASSERT_NE(receiver_.transmitter(), nullptr);
+  EXPECT_EQ(receiver_.transmitter()->port, kA) << "three of our own intervals of two seconds";
+}
+
+TEST_F(Receiver, one_forged_announce_does_not_hide_that_the_transmitter_is_gone) {
+  select_a();
+  Message forged = announce_from(kA);
+  forged.header.log_interval = 7;
+  static_cast<void>(general(forged, 1s));
+  static_cast<void>(receiver_.on_timer(local(7'100ms)));
+  EXPECT_EQ(receiver_.transmitter(), nullptr);
+}
+
+TEST_F(Receiver, a_transmitter_that_announces_slower_than_we_would_is_kept) {
+  Message slow = announce_from(kA);
+  slow.header.log_interval = 4;
+  for (int i = 0; i < 20; ++i) {
+    if (const auto due = receiver_.deadline(); due && *due <= local(i * 16s)) {
+      static_cast<void>(receiver_.on_timer(local(i * 16s)));
+    }
+    static_cast<void>(general(slow, i * 16s));
+    EXPECT_EQ(receiver_.transmitter() != nullptr, i > 0) << i;
+  }
+}
+
+TEST_F(Receiver, identities_that_no_clock_has_are_not_followed) {
+  const ClockIdentity nobody{};
+  const ClockIdentity everybody{{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF}};
+  for (const PortIdentity& odd : {PortIdentity{nobody, 1}, PortIdentity{everybody, 1},
+                                  PortIdentity{kA.clock, 0}, PortIdentity{kA.clock, 0xFFFF}}) {
+    EXPECT_TRUE(general(announce_from(odd), 0s).empty());
+    EXPECT_TRUE(general(announce_from(odd), 250ms).empty());
+  }
+  Message of_nobody = announce_from(kA);
+  std::get_if<Announce>(&of_nobody.body)->grandmaster = nobody;
+  EXPECT_TRUE(general(of_nobody, 500ms).empty());
+  EXPECT_EQ(count(Counter::kUnusableAnnounce), 9U);
+}
+
 }  // namespace
 }  // namespace ftcs::ptp::receiver_test

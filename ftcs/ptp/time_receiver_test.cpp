@@ -155,16 +155,16 @@ TEST_F(Receiver, honours_the_delay_request_interval_that_the_transmitter_demands
   response.header.log_interval = 3;
   static_cast<void>(general(response, 1s));
   EXPECT_GT(*receiver_.deadline(), local(1s));
-  Message announce = announce_from(kA);
-  announce.header.log_interval = 7;  // no timeout in between
   auto now = local(1s);
+  auto requested = now;
   double sum = 0.0;
-  for (int i = 0; i < 200; ++i) {
-    static_cast<void>(receiver_.on_general_message(bytes_of(announce).view(), now));
-    const auto next = *receiver_.deadline();
-    sum += (next - now).seconds();
-    now = next;
-    ASSERT_EQ(of<SendMessage>(receiver_.on_timer(now)).size(), 1U);
+  for (int i = 0; i < 200;) {
+    static_cast<void>(receiver_.on_general_message(bytes_of(announce_from(kA)).view(), now));
+    now = std::min(*receiver_.deadline(), now + Duration{1s});
+    if (of<SendMessage>(receiver_.on_timer(now)).empty()) continue;
+    sum += (now - requested).seconds();
+    requested = now;
+    ++i;
   }
   EXPECT_NEAR(sum / 200.0, 8.0, 1.0);
 }
