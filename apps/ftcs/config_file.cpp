@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <sstream>
+#include <string>
 
 #include <fmt/core.h>
 
@@ -14,6 +14,17 @@ namespace ftcs::app {
 namespace {
 
 constexpr std::string_view kBlank = " \t\r";
+constexpr std::size_t kLongestLine = 1'000;
+constexpr std::size_t kLargestFile = 1'000'000;
+
+/// A terminal obeys control characters.
+std::string printable(std::string text) {
+  for (char& c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code < ' ' || code == 0x7F) c = '?';
+  }
+  return text;
+}
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlank);
@@ -61,8 +72,12 @@ std::optional<std::string> read_config_text(std::string_view text, std::string_v
     const std::string_view line = trimmed(text.substr(0, end));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (line.empty() || line.front() == '#') continue;
+    if (line.size() > kLongestLine) {
+      return fmt::format("{}:{}: a line of {} characters; expected {} at most", name, number,
+                         line.size(), kLongestLine);
+    }
     if (const auto wrong = read_line(line, in_section, options)) {
-      return fmt::format("{}:{}: {}", name, number, *wrong);
+      return fmt::format("{}:{}: {}", name, number, printable(*wrong));
     }
   }
   return std::nullopt;
@@ -70,11 +85,15 @@ std::optional<std::string> read_config_text(std::string_view text, std::string_v
 
 std::optional<std::string> read_config_file(const std::string& path, PtpOptions& options) {
   std::ifstream file(path);
-  std::ostringstream text;
   // A folder can be opened, but not read.
   if (!file || (file.peek(), file.bad())) return fmt::format("{}: {}", path, std::strerror(errno));
-  if (!file.eof()) text << file.rdbuf();
-  return read_config_text(text.str(), path, options);
+  std::string text(kLargestFile + 1, '\0');
+  if (!file.eof()) file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kLargestFile) {
+    return fmt::format("{}: longer than {} characters: no configuration file", path, kLargestFile);
+  }
+  return read_config_text(text, path, options);
 }
 
 }  // namespace ftcs::app

@@ -23,6 +23,16 @@ PtpOptions options_of(const char* text) {
   return options;
 }
 
+// A line of 10 MB took 35 s to be compared with every name, and was printed.
+TEST(ConfigFile, endless_lines_and_control_characters_are_refused_without_being_repeated) {
+  const std::string endless = "[global]\n" + std::string(10'000'000, 'x') + " 1\n";
+  EXPECT_EQ(error_of(endless.c_str()),
+            "ptp.conf:2: a line of 10000002 characters; expected 1000 at most");
+  const std::string escape = error_of("[global]\n\x1b[2Jdomain 1\n");
+  EXPECT_EQ(escape.find('\x1b'), std::string::npos);
+  EXPECT_NE(escape.find("ptp.conf:2: unknown setting '?[2Jdomain'"), std::string::npos) << escape;
+}
+
 TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
   const PtpOptions options = options_of(
       "[global]\n"

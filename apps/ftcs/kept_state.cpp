@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -21,6 +24,10 @@ constexpr int kVersion = 1;
 constexpr std::int64_t kOldest_s = std::int64_t{90} * 86'400;
 /// A crystal that was switched off, or is warmer than before, does not come back closer than this.
 constexpr double kLeastRateSigma = 2e-7;
+/// Between any two crystals; more would be somebody's joke, and the clock starts with it.
+constexpr double kLargestRate = 1e-3;
+/// The year 9999.
+constexpr std::int64_t kLatest_s = 253'402'300'799;
 /// Nobody writes more; a file that is larger is something else.
 constexpr std::size_t kLargestFile = 65'536;
 
@@ -38,12 +45,16 @@ Result<LearntState, std::string> from_json(const Json& json, std::string_view cl
   const auto kept_clock = json.at("clock").get<std::string>();
   if (kept_clock != clock)
     return fmt::format("it is of another clock ({}), this is {}", kept_clock, clock);
-  const std::int64_t age_s = now - json.at("saved_at_s").get<std::int64_t>();
+  const auto saved_at_s = json.at("saved_at_s").get<std::int64_t>();
+  if (saved_at_s < 0 || saved_at_s > kLatest_s) return std::string("its date is impossible");
+  const std::int64_t age_s = now - saved_at_s;
   if (age_s > kOldest_s) return fmt::format("it is {} days old", age_s / 86'400);
   LearntState learnt{json.at("rate_ppb").get<double>() * 1e-9,
                      json.at("rate_sigma_ppb").get<double>() * 1e-9,
                      json.at("timestamp_noise_ns").get<double>()};
-  if (!learnt.valid()) return std::string("its figures are impossible");
+  if (!learnt.valid() || std::abs(learnt.rate_deviation) > kLargestRate) {
+    return std::string("its figures are impossible");
+  }
   learnt.rate_sigma = std::max(learnt.rate_sigma, kLeastRateSigma);
   return learnt;
 }
@@ -72,6 +83,13 @@ Result<LearntState, std::string> read_kept_state(std::string_view text, std::str
 StateKeeper::StateKeeper(Log& log, std::string path, Duration interval, std::string clock)
     : log_(log), path_(std::move(path)), interval_(interval), clock_(std::move(clock)) {
   if (path_.empty()) return;
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path_, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    log_(LogLevel::kWarning, "driftfile {}: not used, it is no regular file", path_);
+    path_.clear();
+    return;
+  }
   std::ifstream file(path_, std::ios::binary);
   if (!file) {
     log_(LogLevel::kInfo, "driftfile {}: not there yet", path_);
@@ -95,13 +113,27 @@ void StateKeeper::note(const ServoSnapshot& snapshot, FreeRunningTime now) {
   if (const auto learnt = learnt_from(snapshot)) latest_ = learnt;
   if (!saved_) saved_ = now;
   if (now - *saved_ < interval_) return;
+  if (!latest_ || !take_result(false)) return;  // a disk that is slow, or stalled: next time
   saved_ = now;
-  save();
+  writing_ = std::async(std::launch::async, platform::write_durably, path_,
+                        to_text({clock_, now_s(), *latest_}));
 }
 
 void StateKeeper::save() {
+  (void)take_result(true);
   if (path_.empty() || !latest_) return;
-  const auto problem = platform::write_durably(path_, to_text({clock_, now_s(), *latest_}));
+  report(platform::write_durably(path_, to_text({clock_, now_s(), *latest_})));
+}
+
+bool StateKeeper::take_result(bool wait) {
+  if (!writing_.valid()) return true;
+  if (!wait && writing_.wait_for(std::chrono::seconds{0}) != std::future_status::ready)
+    return false;
+  report(writing_.get());
+  return true;
+}
+
+void StateKeeper::report(const std::optional<std::string>& problem) {
   if (problem && !warned_) log_(LogLevel::kWarning, "driftfile: {}", *problem);
   warned_ = problem.has_value();
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,12 +37,17 @@ class StateKeeper {
   StateKeeper(Log& log, std::string path, Duration interval, std::string clock);
 
   [[nodiscard]] const std::optional<LearntState>& learnt() const { return learnt_; }
-  /// After each sample of a locked clock.
+  /// After each sample of a locked clock. The file is written beside the loop, by a thread: what
+  /// steers does not wait for a disk.
   void note(const ServoSnapshot& snapshot, FreeRunningTime now);
   /// At the end.
   void save();
 
  private:
+  /// False: the last writing is not done yet. `wait`: until it is.
+  [[nodiscard]] bool take_result(bool wait);
+  void report(const std::optional<std::string>& problem);
+
   Log& log_;
   std::string path_;
   Duration interval_;
@@ -49,6 +55,7 @@ class StateKeeper {
   std::optional<LearntState> learnt_;  ///< from the file
   std::optional<LearntState> latest_;
   std::optional<FreeRunningTime> saved_;
+  std::future<std::optional<std::string>> writing_{};
   bool warned_ = false;
 };
 

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
 
@@ -26,6 +27,12 @@ int write_and_sync(int file, std::string_view content) {
   return code;
 }
 
+/// rename(2) puts a file in the place of anything: of /dev/null, for one.
+bool may_be_replaced(const std::string& path) {
+  struct stat status {};
+  return ::lstat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
+}
+
 void sync_folder_of(const std::string& path) {
   const auto slash = path.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
@@ -41,6 +48,7 @@ std::optional<std::string> write_durably(const std::string& path, std::string_vi
   const auto failure = [&path](int code) {
     return "cannot write " + path + ": " + std::generic_category().message(code);
   };
+  if (!may_be_replaced(path)) return "cannot write " + path + ": it is no regular file";
   std::string part = path + ".XXXXXX";
   const int file = ::mkostemp(part.data(), O_CLOEXEC);
   if (file < 0) return failure(errno);

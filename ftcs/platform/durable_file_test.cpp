@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -42,6 +43,21 @@ TEST_F(DurableFile, a_failure_names_the_file_and_costs_nothing) {
   std::filesystem::create_directories(folder_ / "taken" / "inside");
   EXPECT_TRUE(write_durably(folder_ / "taken", "x").has_value());  // a folder is in the way
   EXPECT_EQ(files(), 1);
+}
+
+// --driftfile /dev/null: the device node became a file, for the whole machine.
+TEST_F(DurableFile, what_is_no_regular_file_is_not_replaced) {
+  const auto pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/null", folder_ / "link");
+  for (const char* name : {"pipe", "link"}) {
+    const auto problem = write_durably(folder_ / name, "x");
+    ASSERT_TRUE(problem.has_value()) << name;
+    EXPECT_NE(problem->find("no regular file"), std::string::npos) << *problem;
+  }
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link"));
+  EXPECT_EQ(files(), 2);
 }
 
 }  // namespace

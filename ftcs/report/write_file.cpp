@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <string>
 #include <system_error>
 
 namespace ftcs {
@@ -14,45 +15,58 @@ WriteError failure(const std::filesystem::path& path, int code) {
 
 /// Zero or the error of the first call that failed. Closing can fail too: that is when a full disk
 /// shows.
-int write_whole(const std::filesystem::path& path, std::string_view content) {
-  errno = 0;
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  if (file == nullptr) return errno;
+int write_and_close(std::FILE* file, std::string_view content) {
   int code = 0;
   if (std::fwrite(content.data(), 1, content.size(), file) != content.size()) code = errno;
   if (std::fclose(file) != 0 && code == 0) code = errno;
   return code;
 }
 
-/// What write_file() writes to first.
-std::filesystem::path part_of(const std::filesystem::path& path) {
-  std::filesystem::path part = path;
-  part += ".part";
+struct Part {
+  std::FILE* file = nullptr;  ///< null: errno says why
+  std::filesystem::path path;
+};
+
+/// A file that did not exist: "x" follows no link and opens nothing of somebody else.
+Part new_part_of(const std::filesystem::path& path) {
+  constexpr int kMostTaken = 100;
+  Part part;
+  for (int i = 0; i < kMostTaken; ++i) {
+    part.path = path;
+    part.path += ".part" + std::to_string(i);
+    errno = 0;
+    part.file = std::fopen(part.path.c_str(), "wbx");
+    if (part.file != nullptr || errno != EEXIST) return part;
+  }
   return part;
+}
+
+std::optional<WriteError> write_directly(const std::filesystem::path& path,
+                                         std::string_view content) {
+  errno = 0;
+  std::FILE* const file = std::fopen(path.c_str(), "wb");
+  const int code = file == nullptr ? errno : write_and_close(file, content);
+  if (code == 0) return std::nullopt;
+  return failure(path, code);
 }
 
 }  // namespace
 
 std::optional<WriteError> write_file(const std::filesystem::path& path, std::string_view content) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    const int code = write_whole(path, content);
-    if (code != 0) return failure(path, code);
-    return std::nullopt;
-  }
-  const std::filesystem::path part = part_of(path);
-  if (const int code = write_whole(part, content); code != 0) {
-    std::filesystem::remove(part, ignored);
-    return failure(path, code);
-  }
   std::error_code problem;
-  std::filesystem::rename(part, path, problem);
-  if (problem) {
-    std::filesystem::remove(part, ignored);
-    return failure(path, problem.value());
+  const auto status = std::filesystem::status(path, problem);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    return write_directly(path, content);
   }
-  return std::nullopt;
+  const Part part = new_part_of(path);
+  if (part.file == nullptr) return failure(path, errno);
+  int code = write_and_close(part.file, content);
+  problem.clear();
+  if (code == 0) std::filesystem::rename(part.path, path, problem);
+  if (problem) code = problem.value();
+  if (code == 0) return std::nullopt;
+  std::filesystem::remove(part.path, problem);
+  return failure(path, code);
 }
 
 std::optional<WriteError> check_writable(const std::filesystem::path& path) {
@@ -62,13 +76,10 @@ std::optional<WriteError> check_writable(const std::filesystem::path& path) {
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     return std::nullopt;
   }
-  const std::filesystem::path part = part_of(path);
-  const bool was_there = std::filesystem::exists(part, ignored);
-  errno = 0;
-  std::FILE* const file = std::fopen(part.c_str(), "ab");  // appends: leaves what is there
-  if (file == nullptr) return failure(path, errno);
-  std::fclose(file);
-  if (!was_there) std::filesystem::remove(part, ignored);
+  const Part part = new_part_of(path);
+  if (part.file == nullptr) return failure(path, errno);
+  std::fclose(part.file);
+  std::filesystem::remove(part.path, ignored);
   return std::nullopt;
 }
 

@@ -3,9 +3,11 @@
 // full.
 #include "ftcs/report/write_file.h"
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sys/resource.h>
 
 #include <gtest/gtest.h>
 
@@ -58,13 +60,30 @@ TEST_F(WriteFile, reports_a_full_disk) {
       write_file("/dev/full", "short").has_value());  // noticed at the latest when it is closed
 }
 
-// The part file is a link to the full disk: the older result must survive.
+// A disk on which no file may be larger than 1,000 octets.
 TEST_F(WriteFile, keeps_the_older_result_when_the_disk_is_full) {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   EXPECT_FALSE(write_file(folder_ / "x", "finished").has_value());
-  std::filesystem::create_symlink("/dev/full", folder_ / "x.part");
-  EXPECT_TRUE(write_file(folder_ / "x", "new").has_value());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{1'000, before.rlim_max};
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  EXPECT_TRUE(write_file(folder_ / "x", std::string(100'000, 'x')).has_value());
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
   EXPECT_EQ(content(folder_ / "x"), "finished");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(WriteFile, what_somebody_laid_in_the_way_is_neither_followed_nor_overwritten) {
+  std::ofstream(folder_ / "victim") << "precious";
+  std::filesystem::create_symlink(folder_ / "victim", folder_ / "x.part0");
+  std::filesystem::create_symlink(folder_ / "not_there", folder_ / "x.part1");
+  EXPECT_FALSE(check_writable(folder_ / "x").has_value());
+  EXPECT_FALSE(write_file(folder_ / "x", "new").has_value());
+  EXPECT_EQ(content(folder_ / "victim"), "precious");
+  EXPECT_EQ(content(folder_ / "x"), "new");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "not_there"));
 }
 
 TEST_F(WriteFile, tells_beforehand_what_would_fail) {
@@ -81,10 +100,10 @@ TEST_F(WriteFile, asking_beforehand_changes_nothing) {
   EXPECT_FALSE(check_writable(folder_ / "new").has_value());
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
   EXPECT_FALSE(write_file(folder_ / "x", "finished").has_value());
-  EXPECT_FALSE(write_file(folder_ / "x.part", "of somebody else").has_value());
+  EXPECT_FALSE(write_file(folder_ / "x.part0", "of somebody else").has_value());
   EXPECT_FALSE(check_writable(folder_ / "x").has_value());
   EXPECT_EQ(content(folder_ / "x"), "finished");
-  EXPECT_EQ(content(folder_ / "x.part"), "of somebody else");
+  EXPECT_EQ(content(folder_ / "x.part0"), "of somebody else");
 }
 
 }  // namespace
