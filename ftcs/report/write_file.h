@@ -16,8 +16,8 @@ struct WriteError {
 
 /// Writes the whole content or nothing: into a new file `path`.part0 first, which then takes the
 /// place of `path`, so that a full disk leaves an older result as it was. If that name is taken, by
-/// a file or a link that somebody laid there, part1 and so on. What exists and is no regular file (a
-/// device, a pipe) is written to directly. No value: done.
+/// a file or a link that somebody laid there, part1 and so on. What exists and is no regular file
+/// (a device, a pipe) is written to directly. No value: done.
 [[nodiscard]] std::optional<WriteError> write_file(const std::filesystem::path& path,
                                                    std::string_view content);
 
