@@ -32,7 +32,7 @@ MonitorReceiver::MonitorReceiver(platform::Kernel& kernel, const PtpOptions& opt
                                  const PortFacts& facts, RealClock* real_clock)
     : PtpPort(kernel, options, log, std::move(timestamps), real_clock),
       facts_(facts),
-      follower_(this->options(), log, clock(), now(), has_hardware_stamps(), "ptp4l") {}
+      follower_(this->options(), log, clock(), now(), has_hardware_stamps(), "ptp4l", gate()) {}
 
 std::optional<platform::OsError> MonitorReceiver::open_source() {
   auto socket = platform::LocalSocket::bind(options().monitor_socket);
@@ -46,12 +46,11 @@ std::optional<platform::OsError> MonitorReceiver::open_source() {
   return std::nullopt;
 }
 
-ptp::ActionList MonitorReceiver::start(FreeRunningTime now) {
+void MonitorReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
   last_report_ = now;
   log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",
         has_hardware_stamps() ? "hardware" : "software", options().monitor_socket);
-  return {};
 }
 
 void MonitorReceiver::wait_until(FreeRunningTime underlying) {
@@ -155,10 +154,9 @@ void MonitorReceiver::on_sample(const ptp::MonitorSample& sample) {
     log()(LogLevel::kWarning, "ptp4l: another transmitter, or its time jumped; starting anew");
     follower_.on_new_reference();
   }
-  if (!admits(event->pair)) return;
   if (const auto wrong = follower_.on_pair(event->pair, now(), source_.sync_interval()))
     return fail(*wrong);
-  feed_others(follower_);
+  feed_others(follower_.record());
 }
 
 void MonitorReceiver::watch_for_silence(FreeRunningTime now) {
@@ -208,12 +206,12 @@ int MonitorReceiver::finish() {
 }
 
 ptp::ManagedPort MonitorReceiver::managed_port() {
-  return data_sets(options(), facts_, state(), source_.transmitter(), follower_, now());
+  return data_sets(options(), facts_, state(), source_.transmitter(), follower_.record(), now());
 }
 
 std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
   const StatusOfPort port{options(), facts_, seconds_since_start(), management};
-  return monitor_status(port, source_, state(), follower_, now());
+  return monitor_status(port, source_, state(), follower_.record(), now());
 }
 
 bool complete_by_ptp4l(PtpOptions& options, Log& log) {

@@ -32,20 +32,13 @@ class MonitorReceiver final : public PtpPort, private Managed {
   [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
 
   // There is no protocol of our own: nothing comes, nothing is due.
-  ptp::ActionList start(FreeRunningTime now) override;
-  ptp::ActionList on_event(std::span<const std::uint8_t>, FreeRunningTime,
-                           FreeRunningTime) override {
-    return {};
-  }
-  ptp::ActionList on_general(std::span<const std::uint8_t>, FreeRunningTime) override { return {}; }
-  ptp::ActionList on_sent(const ptp::EventId&, std::optional<FreeRunningTime>,
-                          FreeRunningTime) override {
-    return {};
-  }
-  ptp::ActionList on_timer(FreeRunningTime) override { return {}; }
-  ptp::ActionList on_link_change(bool, FreeRunningTime) override { return {}; }
+  void start(FreeRunningTime now) override;
+  void on_event(std::span<const std::uint8_t>, FreeRunningTime, FreeRunningTime) override {}
+  void on_general(std::span<const std::uint8_t>, FreeRunningTime) override {}
+  void on_sent(const ptp::EventId&, std::optional<FreeRunningTime>, FreeRunningTime) override {}
+  void on_timer(FreeRunningTime) override {}
+  void on_link_change(bool, FreeRunningTime) override {}
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const override { return std::nullopt; }
-  void act(const ptp::Action&) override {}
 
   void read_reports();
   void follow_scale_change();

@@ -125,7 +125,7 @@ void set_transmitter(const ptp::TransmitterData& transmitter, ptp::ManagedPort& 
   port.time_status.grandmaster = announce.grandmaster;
 }
 
-void set_sample(const ClockFollower::Status& status, ptp::ManagedPort& port) {
+void set_sample(const FollowerRecord::Status& status, ptp::ManagedPort& port) {
   if (!status.has_sample || !status.last.offset_known) return;
   port.current.offset = status.last.offset;
   port.current.mean_path_delay = status.last.telemetry.servo.path_delay;
@@ -136,7 +136,7 @@ void set_sample(const ClockFollower::Status& status, ptp::ManagedPort& port) {
 }  // namespace
 
 ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
-                           const ptp::TimeReceiver& core, const ClockFollower& follower,
+                           const ptp::TimeReceiver& core, const FollowerRecord& record,
                            FreeRunningTime now) {
   ptp::ManagedPort port = receiver(options, facts, core.state());
   // In force is what the transmitter demands (7.7.2.4); the other intervals are those that the port
@@ -146,7 +146,7 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
   set_peer_delay(core.peer_delay(), port);
   if (const auto* transmitter = core.transmitter()) {
     set_transmitter(*transmitter, port);
-    set_sample(follower.status(now), port);
+    set_sample(record.status(now), port);
   }
   port.stats = statistics(facts.identity, core.counters());
   return port;
@@ -154,7 +154,7 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
 
 ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts, ptp::PortState state,
                            const std::optional<ptp::PortIdentity>& transmitter,
-                           const ClockFollower& follower, FreeRunningTime now) {
+                           const FollowerRecord& record, FreeRunningTime now) {
   ptp::ManagedPort port = receiver(options, facts, state);
   if (!transmitter) return port;
   port.parent.parent = *transmitter;
@@ -162,7 +162,7 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts, pt
   port.current.steps_removed = 1;
   port.time_status.grandmaster_present = 1;
   port.time_status.grandmaster = transmitter->clock;
-  set_sample(follower.status(now), port);
+  set_sample(record.status(now), port);
   if (options.peer_to_peer()) port.port.mean_link_delay = port.current.mean_path_delay;
   return port;
 }

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/follower_record.h"
 #include "apps/ftcs/ptp_options.h"
 #include "ftcs/ptp/management_responder.h"
 #include "ftcs/ptp/monitor_source.h"
@@ -22,13 +22,13 @@ struct PortFacts {
 /// Data sets of a port that receives time.
 [[nodiscard]] ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
                                          const ptp::TimeReceiver& core,
-                                         const ClockFollower& follower, FreeRunningTime now);
+                                         const FollowerRecord& record, FreeRunningTime now);
 /// Data sets of a port that follows the reports of another time receiver, which say no more about
 /// the transmitter than who it is.
 [[nodiscard]] ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
                                          ptp::PortState state,
                                          const std::optional<ptp::PortIdentity>& transmitter,
-                                         const ClockFollower& follower, FreeRunningTime now);
+                                         const FollowerRecord& record, FreeRunningTime now);
 /// Data sets of a port that is the grandmaster.
 [[nodiscard]] ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts,
                                          const ptp::TimeTransmitter& core);

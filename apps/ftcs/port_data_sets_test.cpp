@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/ftcs/clock_follower.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "test/support/manual_source.h"
 
@@ -33,11 +34,12 @@ TEST(PortDataSets, only_a_clock_that_is_steered_is_offered_to_those_who_would_fo
     PortFacts facts;
     facts.hardware_stamps = hardware;
     const ClockFollower follower(options, log, clock, source.now(), hardware, "test");
-    const auto sets =
-        data_sets(options, facts, PortState::kTimeReceiver, std::nullopt, follower, source.now());
+    const auto sets = data_sets(options, facts, PortState::kTimeReceiver, std::nullopt,
+                                follower.record(), source.now());
     EXPECT_EQ(sets.port.state, expected);
     EXPECT_EQ(sets.properties.state, expected);
-    EXPECT_EQ(data_sets(options, facts, PortState::kListening, std::nullopt, follower, source.now())
+    EXPECT_EQ(data_sets(options, facts, PortState::kListening, std::nullopt, follower.record(),
+                        source.now())
                   .port.state,
               PortState::kListening);
   }

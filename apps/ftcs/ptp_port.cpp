@@ -48,7 +48,7 @@ int PtpPort::run() {
   report_stamps();
   if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
   const platform::StopFlag stop;
-  perform(start(now()));
+  start(now());
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
   while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
@@ -70,9 +70,9 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (const auto due = deadline()) until = std::min(until, *due);
   if (real_clock_ != nullptr) real_clock_->before_wait();
   wait_until(oscillator_.to_underlying(until));
-  if (const auto due = deadline(); due && now() >= *due) perform(on_timer(now()));
+  if (const auto due = deadline(); due && now() >= *due) on_timer(now());
   for (const ptp::EventId& id : std::exchange(unsent_, {})) {
-    perform(on_sent(id, std::nullopt, now()));
+    on_sent(id, std::nullopt, now());
   }
   report_stamps();
   if (management_) management_->serve(*managed(), now());
@@ -94,11 +94,11 @@ void PtpPort::set_scale(const ReferenceScale& scale) {
   if (feed_) feed_->set_scale(scale);
 }
 
-void PtpPort::feed_others(const ClockFollower& follower) {
+void PtpPort::feed_others(const FollowerRecord& record) {
   if (!feed_ || !feed_->is_on()) return;
   const auto reading = timestamps_->read_realtime();
   const FreeRunningTime instant = oscillator_.from_underlying(reading.free_running);
-  feed_->publish(follower, clock().local_at(instant), reading.free_running, reading.realtime_ns);
+  feed_->publish(record, clock().local_at(instant), reading.free_running, reading.realtime_ns);
 }
 
 bool PtpPort::open_management() {
@@ -129,19 +129,14 @@ void PtpPort::wait_until(FreeRunningTime underlying) {
   }
 }
 
-void PtpPort::perform(const ptp::ActionList& actions) {
-  for (const ptp::Action& action : actions) {
-    if (const auto* message = std::get_if<ptp::SendMessage>(&action)) {
-      send(*message);
-    } else if (std::holds_alternative<ptp::SenderIsTransmitter>(action)) {
-      transmitter_ = sender_;
-    } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
-      log_(LogLevel::kNotice, "port 1 ({}): {} to {} on {}", options_.interface,
-           to_string(change->from), to_string(change->to), to_string(change->event));
-      act(action);
-    } else {
-      act(action);
-    }
+void PtpPort::perform(const ptp::Action& action) {
+  if (const auto* message = std::get_if<ptp::SendMessage>(&action)) {
+    send(*message);
+  } else if (std::holds_alternative<ptp::SenderIsTransmitter>(action)) {
+    transmitter_ = sender_;
+  } else if (const auto* change = std::get_if<ptp::PortStateChanged>(&action)) {
+    log_(LogLevel::kNotice, "port 1 ({}): {} to {} on {}", options_.interface,
+         to_string(change->from), to_string(change->to), to_string(change->event));
   }
 }
 
@@ -202,11 +197,11 @@ void PtpPort::send(const ptp::SendMessage& message) {
 
 void PtpPort::on_message(const platform::ReceivedMessage& message) {
   sender_ = message.sender;
-  if (message.channel == ptp::Channel::kGeneral) return perform(on_general(message.bytes, now()));
+  if (message.channel == ptp::Channel::kGeneral) return on_general(message.bytes, now());
   if (!message.stamp) return;  // counted by the socket
   const FreeRunningTime received =
       oscillator_.from_underlying(message.stamp->time) - Duration{options_.ingress_latency};
-  perform(on_event(message.bytes, received, now()));
+  on_event(message.bytes, received, now());
 }
 
 void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
@@ -222,13 +217,13 @@ void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
          std::chrono::duration_cast<std::chrono::milliseconds>(options_.socket.tx_timestamp_timeout)
              .count());
   }
-  perform(on_sent(ptp::event_id(message.bytes), sent, now()));
+  on_sent(ptp::event_id(message.bytes), sent, now());
 }
 
 void PtpPort::on_link(bool up, const std::string& reason) {
   log_(LogLevel::kNotice, "port 1 ({}): link {}{}{}", options_.interface, up ? "up" : "down",
        reason.empty() ? "" : ": ", reason);
-  perform(on_link_change(up, now()));
+  on_link_change(up, now());
 }
 
 void PtpPort::on_readable(int descriptor) {

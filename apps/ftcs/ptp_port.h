@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/ftcs/follower_record.h"
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/management_server.h"
 #include "apps/ftcs/port_data_sets.h"
@@ -41,17 +42,16 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] int run();
 
  protected:
-  virtual ptp::ActionList start(FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
-                                   FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
-                                  FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_timer(FreeRunningTime now) = 0;
-  virtual ptp::ActionList on_link_change(bool up, FreeRunningTime now) = 0;
+  // What comes in. Event stamps and `now` are on the free-running oscillator.
+  virtual void start(FreeRunningTime now) = 0;
+  virtual void on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                        FreeRunningTime now) = 0;
+  virtual void on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) = 0;
+  virtual void on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
+                       FreeRunningTime now) = 0;
+  virtual void on_timer(FreeRunningTime now) = 0;
+  virtual void on_link_change(bool up, FreeRunningTime now) = 0;
   [[nodiscard]] virtual std::optional<FreeRunningTime> deadline() const = 0;
-  /// Actions that only one of the roles knows.
-  virtual void act(const ptp::Action& action) = 0;
   /// Opens where timestamps come from, and waits for them; the network's sockets, unless a port has
   /// none. `underlying`: on the oscillator without skew.
   [[nodiscard]] virtual std::optional<platform::OsError> open_source() { return transport_.open(); }
@@ -63,31 +63,31 @@ class PtpPort : private platform::TransportHandler {
   /// Writes the summary, returns the exit code.
   [[nodiscard]] virtual int finish() = 0;
 
-  void perform(const ptp::ActionList& actions);
+  /// Sends, notes addresses, tells of the port's state; other actions are the role's.
+  void perform(const ptp::Action& action);
   /// Everything that a port counted beside good messages, as one line; nothing if there is none.
   void log_unusual(const ptp::Counters& counters);
   /// What the peer delay mechanism has measured, if it has.
   void log_peer_delay(const ptp::PeerDelay& peer_delay);
   /// The reference's timescale, for a real clock and for other programs.
   void set_scale(const ReferenceScale& scale);
-  /// Whether a pair may reach the servo of a real clock.
-  [[nodiscard]] bool admits(const EventPair& pair) {
-    return real_clock_ == nullptr || real_clock_->admits(pair.reference, pair.free_running);
-  }
   /// Tells chrony and the like, if that is wanted.
-  void feed_others(const ClockFollower& follower);
+  void feed_others(const FollowerRecord& record);
   /// Whether anybody needs to know the timescale.
   [[nodiscard]] bool needs_scale() const {
     return real_clock_ != nullptr || (feed_ && feed_->is_on());
   }
   /// Ends run() with an error line.
   void fail(const std::string& reason);
+  [[nodiscard]] bool has_failed() const { return failure_.has_value(); }
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
   [[nodiscard]] SkewedSource& oscillator() { return oscillator_; }
   [[nodiscard]] AdjustableClock& clock() {
     if (real_clock_ != nullptr) return real_clock_->clock();
     return virtual_clock_;
   }
+  /// Who says what may steer a real clock; null: the clock is virtual.
+  [[nodiscard]] node::ReferenceGate* gate() { return real_clock_; }
   /// Null: the clock is virtual.
   [[nodiscard]] RealClock* real_clock() { return real_clock_; }
   [[nodiscard]] const PtpOptions& options() const { return options_; }

@@ -3,36 +3,49 @@
 
 #include <memory>
 
-#include "apps/ftcs/clock_follower.h"
-#include "apps/ftcs/ptp_core_port.h"
-#include "ftcs/ptp/time_receiver.h"
+#include "apps/ftcs/follower_record.h"
+#include "apps/ftcs/ptp_port.h"
+#include "ftcs/node/receiver_node.h"
 
 namespace ftcs::app {
 
-/// A clock, virtual or real, that follows a PTP time transmitter.
-class PtpReceiver final : public PtpCorePort<ptp::TimeReceiver>, private Managed {
+/// A clock, virtual or real, that follows a PTP time transmitter: a node::ReceiverNode between
+/// sockets and log.
+class PtpReceiver final : public PtpPort, private Managed {
  public:
   PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
               std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
               RealClock* real_clock);
 
  private:
-  ptp::ActionList start(FreeRunningTime now) override;
-  void act(const ptp::Action& action) override;
+  void start(FreeRunningTime now) override;
+  void on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                FreeRunningTime now) override;
+  void on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) override;
+  void on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
+               FreeRunningTime now) override;
+  void on_timer(FreeRunningTime now) override;
+  void on_link_change(bool up, FreeRunningTime now) override;
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const override {
+    return node_.deadline();
+  }
   void housekeeping(FreeRunningTime now) override;
   [[nodiscard]] int finish() override;
   [[nodiscard]] Managed* managed() override { return this; }
   [[nodiscard]] ptp::ManagedPort managed_port() override;
   [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
 
-  void on_pair(const EventPair& pair);
+  void take_events(FreeRunningTime now);
+  void take(const node::ReceiverEvent& event, FreeRunningTime now);
+  void tell(const ptp::Action& action);
   void on_selected(const ptp::TransmitterSelected& selected);
   void follow_scale_change();
-  void follow_lock(bool locked);
   /// True if there was something to say.
   bool log_missing(LogLevel level);
 
-  ClockFollower follower_;
+  StateKeeper state_;
+  node::ReceiverNode node_;
+  FollowerRecord record_;
   bool had_transmitter_ = false;
   bool looked_for_missing_ = false;
   PortFacts facts_;

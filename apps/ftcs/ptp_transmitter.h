@@ -15,7 +15,6 @@ class PtpTransmitter final : public PtpCorePort<ptp::TimeTransmitter>, private M
                  std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts);
 
  private:
-  void act(const ptp::Action&) override {}
   [[nodiscard]] int finish() override;
   [[nodiscard]] Managed* managed() override { return this; }
   [[nodiscard]] ptp::ManagedPort managed_port() override;

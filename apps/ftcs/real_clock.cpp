@@ -61,7 +61,7 @@ void RealClock::set_fixed_scale(int reference_ahead_of_utc_s, int clock_ahead_of
   clock_.set_timescale_offset(Duration::from_whole_ns(-clock_ahead_of_reference_s * kNsPerSecond));
 }
 
-bool RealClock::admits(ReferenceTime reference, FreeRunningTime event) {
+bool RealClock::admits(ReferenceTime reference, FreeRunningTime event) noexcept {
   return utc_.admits(reference, event, kernel_.clock_ns(CLOCK_REALTIME));
 }
 

@@ -8,6 +8,7 @@
 
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/utc_watch.h"
+#include "ftcs/node/reference_gate.h"
 #include "ftcs/platform/kept_rate.h"
 #include "ftcs/platform/kernel_clock.h"
 #include "ftcs/platform/kernel_time_status.h"
@@ -18,11 +19,11 @@ namespace ftcs::app {
 
 /// A clock of the kernel in an event loop: wakes it to end corrections, follows UTC and leap
 /// seconds, tells the kernel and the user what happens.
-class RealClock {
+class RealClock final : public node::ReferenceGate {
  public:
   RealClock(platform::Kernel& kernel, Log& log, platform::KernelClock clock, UtcConfig utc);
   /// However the program ends, the clock does not stay at the rate of a correction.
-  ~RealClock() { stop(); }
+  ~RealClock() override { stop(); }
   RealClock(const RealClock&) = delete;
   RealClock& operator=(const RealClock&) = delete;
 
@@ -43,7 +44,7 @@ class RealClock {
   void set_fixed_scale(int reference_ahead_of_utc_s, int clock_ahead_of_reference_s);
   /// Whether a reading of the reference may steer; no message must reach the servo without.
   /// `event`: the same instant on the clock's free-running face.
-  [[nodiscard]] bool admits(ReferenceTime reference, FreeRunningTime event);
+  [[nodiscard]] bool admits(ReferenceTime reference, FreeRunningTime event) noexcept override;
   /// Has local time moved under the servo's feet since the last question, other than by a leap?
   [[nodiscard]] bool take_scale_change() { return std::exchange(scale_changed_, false); }
   /// Why nothing has been followed so far, if that is why: the run has failed.

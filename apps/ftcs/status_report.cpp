@@ -41,7 +41,7 @@ Json to_json(const ptp::ManagementCounters& counters) {
           {"malformed", counters.malformed}};
 }
 
-Json to_json(const std::deque<ClockFollower::Refusal>& refusals) {
+Json to_json(const std::deque<FollowerRecord::Refusal>& refusals) {
   Json list = Json::array();
   for (const auto& refusal : refusals) {
     Json one{{"time_s", number(refusal.time_s)},
@@ -159,15 +159,15 @@ Json common(const StatusOfPort& port, ptp::PortState state, const ptp::Counters&
           {"messages", messages(counters)}};
 }
 
-void add_follower(Json& status, const ClockFollower& follower, FreeRunningTime now) {
-  const ClockFollower::Status known = follower.status(now);
-  const Telemetry& t = follower.discipline().latest();
+void add_follower(Json& status, const FollowerRecord& record, FreeRunningTime now) {
+  const FollowerRecord::Status known = record.status(now);
+  const Telemetry& t = record.discipline().latest();
   const bool has_offset = known.has_sample && known.last.offset_known;
   const auto if_known = [](bool is_known, double value) {
     return is_known ? number(value) : Json();
   };
   status["state"] = state_name(t.servo.state);
-  status["locked"] = follower.locked();
+  status["locked"] = record.locked();
   status["locked_for_s"] = known.locked_for_s ? number(*known.locked_for_s) : Json();
   status["last_sample_age_s"] = if_known(known.has_sample, known.last_age_s);
   status["offset_ns"] = if_known(has_offset, known.last.offset.ns());
@@ -181,7 +181,7 @@ void add_follower(Json& status, const ClockFollower& follower, FreeRunningTime n
   status["rate_sigma_ppb"] = number(t.servo.rate_sigma_ppb);
   status["timestamp_noise_ns"] = number(t.servo.timestamp_noise_ns);
   status["summary_since_lock"] = known.since_lock.empty() ? Json() : Json(known.since_lock);
-  status["samples"] = to_json(follower.discipline().counters());
+  status["samples"] = to_json(record.discipline().counters());
   status["refusals"] = to_json(known.refusals);
 }
 
@@ -225,20 +225,20 @@ int exit_code_of(const Json& status) {
 }  // namespace
 
 std::string receiver_status(const StatusOfPort& port, const ptp::TimeReceiver& core,
-                            const ClockFollower& follower, FreeRunningTime now) {
+                            const FollowerRecord& record, FreeRunningTime now) {
   Json status = common(port, core.state(), core.counters());
   add_transmitter(status, core.transmitter());
-  add_follower(status, follower, now);
+  add_follower(status, record, now);
   return dump(status);
 }
 
 std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& source,
-                           ptp::PortState state, const ClockFollower& follower,
+                           ptp::PortState state, const FollowerRecord& record,
                            FreeRunningTime now) {
   Json status = common(port, state, ptp::Counters{});
   const auto& transmitter = source.transmitter();
   status["transmitter"] = transmitter ? Json(std::string(to_text(*transmitter).view())) : Json();
-  add_follower(status, follower, now);
+  add_follower(status, record, now);
   const ptp::MonitorCounters& counters = source.counters();
   status["messages"] = {{"syncs", counters.syncs},
                         {"delays", counters.delays},

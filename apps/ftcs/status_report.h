@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/follower_record.h"
 #include "apps/ftcs/port_data_sets.h"
 #include "apps/ftcs/ptp_options.h"
 #include "ftcs/ptp/management_responder.h"
@@ -25,12 +25,12 @@ struct StatusOfPort {
 // The status as one JSON object; docs/beside-your-tools.md lists the fields. Units end their names;
 // what is not known is null.
 [[nodiscard]] std::string receiver_status(const StatusOfPort& port, const ptp::TimeReceiver& core,
-                                          const ClockFollower& follower, FreeRunningTime now);
+                                          const FollowerRecord& record, FreeRunningTime now);
 [[nodiscard]] std::string transmitter_status(const StatusOfPort& port,
                                              const ptp::TimeTransmitter& core);
 
 [[nodiscard]] std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& source,
-                                         ptp::PortState state, const ClockFollower& follower,
+                                         ptp::PortState state, const FollowerRecord& record,
                                          FreeRunningTime now);
 
 /// The same for people, as lines "name  value".

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/ftcs/clock_follower.h"
 #include "apps/ftcs/commands.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "test/support/manual_source.h"
@@ -62,14 +63,14 @@ TEST(StatusReport, ATimeReceiverThatHearsNobodyKnowsNoOffset) {
   const PortFacts facts{};
   const ptp::ManagementCounters management{};
   const auto json =
-      receiver_status({options, facts, 1.0, management}, core, follower, source.now());
+      receiver_status({options, facts, 1.0, management}, core, follower.record(), source.now());
   EXPECT_NE(json.find("\"offset_ns\": null"), std::string::npos) << json;
   EXPECT_NE(json.find("\"transmitter\": null"), std::string::npos);
   const auto status = read_status(json);
   ASSERT_TRUE(status.has_value());
   EXPECT_EQ(status->exit_code, kNotLocked);
 
-  const auto sets = data_sets(options, facts, core, follower, source.now());
+  const auto sets = data_sets(options, facts, core, follower.record(), source.now());
   EXPECT_EQ(sets.current, ptp::CurrentDataSet{});
   EXPECT_EQ(sets.default_set.quality.clock_class, 255);
   EXPECT_EQ(sets.parent.parent, (ptp::PortIdentity{facts.identity.clock, 0}));
@@ -99,7 +100,7 @@ TEST(StatusReport, PeerToPeerThePathDelayIsThatOfTheLink) {
   const PortFacts facts{};
   const ptp::ManagementCounters management{};
   const auto json = monitor_status({options, facts, 1.0, management}, reports,
-                                   ptp::PortState::kTimeReceiver, follower, source.now());
+                                   ptp::PortState::kTimeReceiver, follower.record(), source.now());
   EXPECT_NE(json.find("\"path_delay_ns\": 1500.0"), std::string::npos) << json;
 }
 

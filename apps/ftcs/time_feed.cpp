@@ -13,9 +13,9 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// How far the steered clock may be from the reference, at one standard deviation: the servo's own
 /// word, or what the perceived offsets scatter since lock.
-double sigma_s(const ClockFollower& follower) {
-  const double own_ns = follower.discipline().latest().servo.offset_sigma_ns;
-  const double ns = std::isfinite(own_ns) ? own_ns : follower.offset_rms_ns();
+double sigma_s(const FollowerRecord& record) {
+  const double own_ns = record.discipline().latest().servo.offset_sigma_ns;
+  const double ns = std::isfinite(own_ns) ? own_ns : record.offset_rms_ns();
   return ns * 1e-9;
 }
 
@@ -63,10 +63,10 @@ void TimeFeed::set_scale(const ReferenceScale& scale) {
   utc_.on_announced(scale, utc_s_.value_or(kernel_.clock_ns(CLOCK_REALTIME) / kNsPerSecond));
 }
 
-void TimeFeed::publish(const ClockFollower& follower, LocalTime local, FreeRunningTime event,
+void TimeFeed::publish(const FollowerRecord& record, LocalTime local, FreeRunningTime event,
                        std::int64_t realtime_ns) {
-  const std::uint64_t used = follower.discipline().counters().used;
-  if (!follower.locked() || used == std::exchange(told_, used)) return;
+  const std::uint64_t used = record.discipline().counters().used;
+  if (!record.locked() || used == std::exchange(told_, used)) return;
   const ReferenceTime reference{local.since_epoch()};
   if (!utc_.admits(reference, event, realtime_ns)) return;
   const node::UtcFollower& utc = utc_.follower();
@@ -77,7 +77,7 @@ void TimeFeed::publish(const ClockFollower& follower, LocalTime local, FreeRunni
   sample.behind = reference.since_epoch() - Duration::from_whole_ns(realtime_ns) -
                   Duration{std::chrono::seconds{utc.utc_offset()}};
   sample.leap = utc.expected_leap();
-  sample.sigma_s = sigma_s(follower);
+  sample.sigma_s = sigma_s(record);
   send(sample);
 }
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "apps/ftcs/clock_follower.h"
+#include "apps/ftcs/follower_record.h"
 #include "apps/ftcs/log.h"
 #include "apps/ftcs/ptp_options.h"
 #include "apps/ftcs/utc_watch.h"
@@ -26,7 +26,7 @@ class TimeFeed {
   /// passed on.
   void set_scale(const ReferenceScale& scale);
   /// The steered clock, an oscillator that nobody steers and CLOCK_REALTIME at the same instant.
-  void publish(const ClockFollower& follower, LocalTime local, FreeRunningTime event,
+  void publish(const FollowerRecord& record, LocalTime local, FreeRunningTime event,
                std::int64_t realtime_ns);
   [[nodiscard]] bool is_on() const { return socket_.has_value() || shm_.has_value(); }
 

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/ftcs/clock_follower.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/platform/local_socket.h"
 #include "ftcs/ptp/wire/message.h"
@@ -58,7 +59,7 @@ class Feed : public testing::Test {
   }
   void publish(TimeFeed& feed, std::int64_t system_minus_reference) {
     const LocalTime local = clock->local_at(source.now());
-    feed.publish(*follower, local, source.now(),
+    feed.publish(follower->record(), local, source.now(),
                  local.since_epoch().rounded_ns() + system_minus_reference);
   }
   /// What a transmitter of TAI announces, if `flags` say no more.

@@ -40,13 +40,23 @@ Note note(NoteKind kind) noexcept {
 
 }  // namespace
 
-ClockFollower::ClockFollower(const ClockFollowerConfig& config, AdjustableClock& clock) noexcept
+ClockFollower::ClockFollower(const ClockFollowerConfig& config, AdjustableClock& clock,
+                             ReferenceGate* gate) noexcept
     : config_(config),
       clock_(clock),
+      gate_(gate),
       discipline_(discipline_config(config), clock),
       link_delay_(link_delay_config(config)) {}
 
+bool ClockFollower::admits(const EventPair& pair) noexcept {
+  return gate_ == nullptr || gate_->admits(pair.reference, pair.free_running);
+}
+
 void ClockFollower::on_pair(const EventPair& pair, std::optional<Duration> sync_interval) noexcept {
+  if (admits(pair)) follow(pair, sync_interval);
+}
+
+void ClockFollower::follow(const EventPair& pair, std::optional<Duration> sync_interval) noexcept {
   if (config_.peer_to_peer) {
     if (!link_delay_.known()) {
       waiting_ = pair;
@@ -165,9 +175,10 @@ void ClockFollower::on_link_delay(const ptp::EmitPeerDelay& measured,
     forget_stamps();
     begin_anew(note(NoteKind::kAnotherLink));
   }
-  if (waiting_) on_pair(*std::exchange(waiting_, std::nullopt), sync_interval);
+  if (waiting_) follow(*std::exchange(waiting_, std::nullopt), sync_interval);
   if (!hears_stamps()) return;
-  if (measured.stamps) return hear_stamps(*measured.stamps);
+  // The delay is one, whatever its stamps say of time.
+  if (measured.stamps && admits(measured.stamps->request)) return hear_stamps(*measured.stamps);
   if (shares_timescale()) ++unstamped_exchanges_;
 }
 

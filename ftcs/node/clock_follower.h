@@ -11,6 +11,7 @@
 #include "ftcs/measurement/link_delay.h"
 #include "ftcs/measurement/shared_timescale.h"
 #include "ftcs/node/follower_event.h"
+#include "ftcs/node/reference_gate.h"
 #include "ftcs/ptp/actions.h"
 
 namespace ftcs::node {
@@ -33,8 +34,10 @@ struct ClockFollowerConfig {
 /// Without I/O. After each input the events are to be taken with next() until there is none.
 class ClockFollower {
  public:
-  /// The clock must outlive the follower. Valid: validate(config.discipline.servo) finds nothing.
-  ClockFollower(const ClockFollowerConfig& config, AdjustableClock& clock) noexcept;
+  /// Clock and gate must outlive the follower; without a gate everything may steer. Valid:
+  /// validate(config.discipline.servo) finds nothing.
+  ClockFollower(const ClockFollowerConfig& config, AdjustableClock& clock,
+                ReferenceGate* gate = nullptr) noexcept;
 
   /// Before the first message: a rate that is known already.
   [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept {
@@ -68,6 +71,8 @@ class ClockFollower {
   /// with all its notes, makes eleven.
   static constexpr std::size_t kMostEvents = 12;
 
+  [[nodiscard]] bool admits(const EventPair& pair) noexcept;
+  void follow(const EventPair& pair, std::optional<Duration> sync_interval) noexcept;
   [[nodiscard]] Steered steer(EventPair pair, bool paces) noexcept;
   void note_refusals(const Telemetry& telemetry) noexcept;
   void hear_stamps(const ptp::PeerStamps& stamps) noexcept;
@@ -88,6 +93,7 @@ class ClockFollower {
 
   ClockFollowerConfig config_;
   AdjustableClock& clock_;
+  ReferenceGate* gate_;
   ClockDiscipline discipline_;
   LinkDelay link_delay_;
   SharedTimescale timescale_;  ///< of the neighbour's stamps

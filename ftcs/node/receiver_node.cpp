@@ -14,8 +14,9 @@ ClockFollowerConfig follower_config(const ReceiverNodeConfig& config) noexcept {
 
 }  // namespace
 
-ReceiverNode::ReceiverNode(const ReceiverNodeConfig& config, AdjustableClock& clock) noexcept
-    : port_(config.port), follower_(follower_config(config), clock) {}
+ReceiverNode::ReceiverNode(const ReceiverNodeConfig& config, AdjustableClock& clock,
+                           ReferenceGate* gate) noexcept
+    : port_(config.port), follower_(follower_config(config), clock, gate) {}
 
 void ReceiverNode::start(FreeRunningTime now) noexcept { take(port_.start(now), now); }
 

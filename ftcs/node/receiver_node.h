@@ -10,6 +10,7 @@
 #include "ftcs/clock/adjustable_clock.h"
 #include "ftcs/node/clock_follower.h"
 #include "ftcs/node/follower_event.h"
+#include "ftcs/node/reference_gate.h"
 #include "ftcs/ptp/actions.h"
 #include "ftcs/ptp/time_receiver.h"
 
@@ -33,12 +34,13 @@ using ReceiverEvent = std::variant<ptp::Action, Steered, Note>;
 /// Without I/O: the daemon and the simulator feed the same object. `now` and event stamps are
 /// readings of the free-running oscillator; `now` must not run backward. After each input the
 /// events are to be taken with next() until there is none. Work is done event by event: who changes
-/// the clock's timescale upon ptp::TransmitterSelected (on_new_timescale()) does so before the
-/// first pair of that transmitter is steered.
+/// the clock's timescale upon ptp::TransmitterSelected (on_new_reference(), on_new_timescale())
+/// does so before the first pair of that transmitter is steered.
 class ReceiverNode {
  public:
-  /// The clock must outlive the node.
-  ReceiverNode(const ReceiverNodeConfig& config, AdjustableClock& clock) noexcept;
+  /// Clock and gate must outlive the node; without a gate everything may steer.
+  ReceiverNode(const ReceiverNodeConfig& config, AdjustableClock& clock,
+               ReferenceGate* gate = nullptr) noexcept;
 
   /// Before the first message: a rate that is known already.
   [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept {
@@ -57,6 +59,8 @@ class ReceiverNode {
   void on_link_up(FreeRunningTime now) noexcept;
   /// Once per turn of the loop, and at least every second: notices that Syncs have stopped.
   void on_silence(FreeRunningTime now) noexcept;
+  /// What was learnt about the reference is void. May stand between two calls of next().
+  void on_new_reference() noexcept { follower_.on_new_reference(); }
   /// The steered clock was put onto another timescale. May stand between two calls of next().
   void on_new_timescale() noexcept { follower_.on_new_timescale(); }
 

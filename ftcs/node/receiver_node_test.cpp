@@ -201,6 +201,29 @@ TEST_F(Node, a_timescale_told_with_the_transmitter_is_in_force_before_its_first_
   EXPECT_FALSE(places<Steered>().empty());
 }
 
+/// Admits what came before an instant.
+class GateThatCloses final : public ReferenceGate {
+ public:
+  bool admits(ReferenceTime, FreeRunningTime event) noexcept override { return event < until; }
+  FreeRunningTime until{};
+};
+
+TEST_F(Node, what_the_gate_does_not_admit_steers_nothing) {
+  GateThatCloses gate;
+  gate.until = local(5s);
+  begin();
+  node.emplace(config, *clock, &gate);
+  node->start(local(0s));
+  announce(kA, 0s);
+  announce(kA, 250ms);
+  start = 250ms;
+  cycles(30);
+  const std::uint64_t used = node->discipline().counters().used;
+  EXPECT_GT(used, 20U);
+  cycles(60);
+  EXPECT_NEAR(static_cast<double>(node->discipline().counters().used), 38.0, 1.0);
+}
+
 TEST_F(Node, a_jump_of_the_reference_is_told_and_begins_anew) {
   lock();
   events.clear();

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "ftcs/time/instant.h"
+
+namespace ftcs::node {
+
+/// Whether what a reference shows may steer at all: asked of every message before the servo sees
+/// it. Virtual because the answer (UtcFollower) needs readings of clocks that the node does not
+/// have.
+class ReferenceGate {
+ public:
+  virtual ~ReferenceGate() = default;
+  /// `event`: the same instant on the free-running oscillator.
+  [[nodiscard]] virtual bool admits(ReferenceTime reference, FreeRunningTime event) noexcept = 0;
+
+ protected:
+  ReferenceGate() = default;
+  ReferenceGate(const ReferenceGate&) = default;
+  ReferenceGate& operator=(const ReferenceGate&) = default;
+};
+
+}  // namespace ftcs::node
