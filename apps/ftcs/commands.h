@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include "ftcs/daemon/exit_code.h"
+
 namespace CLI {
 class App;
 }
 
 namespace ftcs::app {
 
-/// Exit codes of every subcommand (docs/ptp.md); stable.
-enum ExitCode : int {
-  kSuccess = 0,       ///< done; a time receiver: locked when it stopped
-  kRuntimeError = 1,  ///< the system refused something, or the reference is not usable
-  kUsageError = 2,    ///< a wrong flag, value or configuration file
-  kNotLocked = 3,     ///< stopped in good order, but not locked
-};
+using enum daemon::ExitCode;
 
 /// Each adds one subcommand; when it is the one that was given, it runs and leaves its code in
 /// `exit_code`.

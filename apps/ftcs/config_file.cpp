@@ -37,7 +37,7 @@ bool is_unsupported_section(std::string_view section) {
   return section == "unicast_master_table" || section == "message_tag" || section.empty();
 }
 
-std::optional<std::string> enter_section(std::string_view line, PtpOptions& options) {
+std::optional<std::string> enter_section(std::string_view line, daemon::PtpOptions& options) {
   if (line.back() != ']') return "a section needs a closing bracket";
   const std::string_view section = trimmed(line.substr(1, line.size() - 2));
   if (section == "global") return std::nullopt;
@@ -51,7 +51,8 @@ std::optional<std::string> enter_section(std::string_view line, PtpOptions& opti
   return std::nullopt;
 }
 
-std::optional<std::string> read_line(std::string_view line, bool& in_section, PtpOptions& options) {
+std::optional<std::string> read_line(std::string_view line, bool& in_section,
+                                     daemon::PtpOptions& options) {
   if (line.front() == '[') {
     in_section = true;
     return enter_section(line, options);
@@ -65,7 +66,7 @@ std::optional<std::string> read_line(std::string_view line, bool& in_section, Pt
 }  // namespace
 
 std::optional<std::string> read_config_text(std::string_view text, std::string_view name,
-                                            PtpOptions& options) {
+                                            daemon::PtpOptions& options) {
   bool in_section = false;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
@@ -83,7 +84,7 @@ std::optional<std::string> read_config_text(std::string_view text, std::string_v
   return std::nullopt;
 }
 
-std::optional<std::string> read_config_file(const std::string& path, PtpOptions& options) {
+std::optional<std::string> read_config_file(const std::string& path, daemon::PtpOptions& options) {
   std::ifstream file(path);
   // A folder can be opened, but not read.
   if (!file || (file.peek(), file.bad())) return fmt::format("{}: {}", path, std::strerror(errno));

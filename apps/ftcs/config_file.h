@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "apps/ftcs/ptp_options.h"
+#include "ftcs/daemon/ptp_options.h"
 
 namespace ftcs::app {
 
@@ -13,11 +13,11 @@ namespace ftcs::app {
 /// comments from #. One port: a second interface is an error. Returns "FILE:LINE: what is wrong",
 /// or nothing.
 [[nodiscard]] std::optional<std::string> read_config_file(const std::string& path,
-                                                          PtpOptions& options);
+                                                          daemon::PtpOptions& options);
 
 /// The same from text; `name` stands for the path in messages.
 [[nodiscard]] std::optional<std::string> read_config_text(std::string_view text,
                                                           std::string_view name,
-                                                          PtpOptions& options);
+                                                          daemon::PtpOptions& options);
 
 }  // namespace ftcs::app

@@ -12,12 +12,12 @@ namespace ftcs::app {
 namespace {
 
 std::string error_of(const char* text) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   return read_config_text(text, "ptp.conf", options).value_or("");
 }
 
-PtpOptions options_of(const char* text) {
-  PtpOptions options;
+daemon::PtpOptions options_of(const char* text) {
+  daemon::PtpOptions options;
   const auto wrong = read_config_text(text, "ptp.conf", options);
   EXPECT_EQ(wrong.value_or(""), "");
   return options;
@@ -34,7 +34,7 @@ TEST(ConfigFile, endless_lines_and_control_characters_are_refused_without_being_
 }
 
 TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
-  const PtpOptions options = options_of(
+  const daemon::PtpOptions options = options_of(
       "[global]\n"
       "domainNumber\t24\n"
       "  logSyncInterval   -3  \n"
@@ -69,7 +69,8 @@ TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
 
 TEST(ConfigFile, delay_filters_are_ptp4ls_and_one_more) {
   const auto kind = [](const std::string& name) {
-    const PtpOptions options = options_of(("[global]\ndelay_filter " + name + "\n").c_str());
+    const daemon::PtpOptions options =
+        options_of(("[global]\ndelay_filter " + name + "\n").c_str());
     EXPECT_TRUE(options.delay_filter_given);
     return options.servo.two_way.path_delay.filter.kind;
   };
@@ -80,10 +81,10 @@ TEST(ConfigFile, delay_filters_are_ptp4ls_and_one_more) {
 }
 
 TEST(ConfigFile, both_spellings_of_the_roles_are_known) {
-  EXPECT_EQ(options_of("[global]\nmasterOnly 1\n").role, Role::kTimeTransmitter);
-  EXPECT_EQ(options_of("[global]\nserverOnly 1\n").role, Role::kTimeTransmitter);
-  EXPECT_EQ(options_of("[global]\nslaveOnly 1\n").role, Role::kTimeReceiver);
-  EXPECT_EQ(options_of("[global]\nclientOnly 1\n").role, Role::kTimeReceiver);
+  EXPECT_EQ(options_of("[global]\nmasterOnly 1\n").role, daemon::Role::kTimeTransmitter);
+  EXPECT_EQ(options_of("[global]\nserverOnly 1\n").role, daemon::Role::kTimeTransmitter);
+  EXPECT_EQ(options_of("[global]\nslaveOnly 1\n").role, daemon::Role::kTimeReceiver);
+  EXPECT_EQ(options_of("[global]\nclientOnly 1\n").role, daemon::Role::kTimeReceiver);
   EXPECT_EQ(options_of("[global]\nslaveOnly 0\n").notes.size(), 1U);
 }
 
@@ -108,13 +109,13 @@ TEST(ConfigFile, every_error_names_file_line_and_setting) {
 }
 
 TEST(ConfigFile, a_missing_file_is_named) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(read_config_file("/nonexistent/ptp.conf", options).value_or(""),
             "/nonexistent/ptp.conf: No such file or directory");
 }
 
 TEST(Presets, gptp_is_an_end_station_of_802_1as) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(apply_preset(options, "gptp").value_or(""), "");
   EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kEthernet);
   EXPECT_EQ(options.socket.primary_mac, options.socket.peer_mac);
@@ -132,19 +133,19 @@ TEST(Presets, gptp_is_an_end_station_of_802_1as) {
 
 TEST(Presets, default_profiles_differ_in_the_delay_mechanism_and_ask_nothing_of_a_neighbour) {
   for (const bool peer_to_peer : {false, true}) {
-    PtpOptions options;
+    daemon::PtpOptions options;
     EXPECT_EQ(apply_preset(options, peer_to_peer ? "default-p2p" : "default-e2e").value_or(""), "");
     EXPECT_EQ(options.peer_to_peer(), peer_to_peer);
     EXPECT_FALSE(options.peer_delay_config().capability_needed);
     EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kUdpIpv4);
   }
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(apply_preset(options, "g8275").value_or(""),
             "unknown preset 'g8275' (known: default-e2e, default-p2p, gptp)");
 }
 
 TEST(Settings, transports_addresses_and_limits_have_ptp4ls_names_and_units) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(apply_setting(options, "ptp_dst_mac", "01:80:C2:00:00:0E").value_or(""), "");
   EXPECT_EQ(options.socket.primary_mac, (platform::MacAddress{1, 0x80, 0xC2, 0, 0, 0x0E}));
   EXPECT_EQ(apply_setting(options, "udp6_scope", "0x05").value_or(""), "");

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "apps/ftcs/live_view.h"
-#include "apps/ftcs/ptp_core_port.h"
 #include "apps/ftcs/servo_trial.h"
+#include "ftcs/daemon/ptp_core_port.h"
 #include "ftcs/platform/child_process.h"
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/report/table.h"
@@ -52,10 +52,10 @@ struct DemoResult {
 
 /// Time receiver of the demonstration: one protocol core, and every servo on its own virtual clock
 /// behind it.
-class DemoReceiver final : public PtpCorePort<ptp::TimeReceiver> {
+class DemoReceiver final : public daemon::PtpCorePort<ptp::TimeReceiver> {
  public:
-  DemoReceiver(platform::Kernel& kernel, const PtpOptions& options, const DemoOptions& demo,
-               Log& log, std::unique_ptr<platform::TimestampClock> timestamps,
+  DemoReceiver(platform::Kernel& kernel, const daemon::PtpOptions& options, const DemoOptions& demo,
+               daemon::Log& log, std::unique_ptr<platform::TimestampClock> timestamps,
                platform::ChildProcess* transmitter);  ///< null: somebody else's
 
   /// Meaningful after run().

@@ -11,8 +11,8 @@
 #include "apps/ftcs/demo_ethercat.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
-#include "apps/ftcs/ptp_transmitter.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/daemon/ptp_transmitter.h"
 
 namespace ftcs::app {
 namespace {
@@ -49,8 +49,8 @@ ptp::ClockIdentity identity(std::uint8_t last) {
   return ptp::ClockIdentity::from_mac({0x02, 0x46, 0x54, 0x43, 0x53, last});
 }
 
-PtpOptions port_options(platform::Kernel& kernel, const DemoOptions& demo) {
-  PtpOptions options;
+daemon::PtpOptions port_options(platform::Kernel& kernel, const DemoOptions& demo) {
+  daemon::PtpOptions options;
   options.interface = "lo";
   if (!demo.interface.empty()) {
     options.interface = demo.interface;
@@ -63,11 +63,11 @@ PtpOptions port_options(platform::Kernel& kernel, const DemoOptions& demo) {
   options.log_sync_interval = demo.log_sync_interval;
   options.log_min_delay_req_interval = demo.log_sync_interval;
   options.log_announce_interval = -2;  // two of them qualify the transmitter: half a second
-  options.log_level = static_cast<int>(LogLevel::kWarning);
+  options.log_level = static_cast<int>(daemon::LogLevel::kWarning);
   return options;
 }
 
-std::optional<platform::OsError> open(platform::Kernel& kernel, const PtpOptions& options,
+std::optional<platform::OsError> open(platform::Kernel& kernel, const daemon::PtpOptions& options,
                                       std::unique_ptr<platform::TimestampClock>& clock) {
   auto opened = platform::TimestampClock::open(kernel, options.interface, options.timestamps);
   if (!opened) return opened.error();
@@ -75,19 +75,19 @@ std::optional<platform::OsError> open(platform::Kernel& kernel, const PtpOptions
   return std::nullopt;
 }
 
-int run_transmitter(PtpOptions options) {
+int run_transmitter(daemon::PtpOptions options) {
   // Ctrl-C at a terminal goes to a process group: only the receiver must hear it, which then ends
   // us; otherwise it would find its transmitter dead and call that an error.
   (void)setpgid(0, 0);
   platform::LinuxKernel kernel;
-  Log log(kernel, stderr, options.log_level);
-  options.role = Role::kTimeTransmitter;
+  daemon::Log log(kernel, stderr, options.log_level);
+  options.role = daemon::Role::kTimeTransmitter;
   std::unique_ptr<platform::TimestampClock> clock;
   if (const auto error = open(kernel, options, clock)) {
     fmt::print(stderr, "ftcs demo: {}\n", error->message());
     return kRuntimeError;
   }
-  return PtpTransmitter(kernel, options, log, std::move(clock), {{identity(1), 1}}).run();
+  return daemon::PtpTransmitter(kernel, options, log, std::move(clock), {{identity(1), 1}}).run();
 }
 
 struct DemoArguments {
@@ -125,12 +125,12 @@ namespace {
 /// The PTP half; a message and an exit code if it could not be shown.
 int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
   platform::LinuxKernel kernel;
-  PtpOptions options = port_options(kernel, demo);
+  daemon::PtpOptions options = port_options(kernel, demo);
   if (const auto error = port_in_use(kernel, options.socket.event_port)) {
     fmt::print(stderr, "ftcs demo: {}\n", error->message());
     return kRuntimeError;
   }
-  Log log(kernel, stderr, options.log_level);
+  daemon::Log log(kernel, stderr, options.log_level);
   std::unique_ptr<platform::TimestampClock> clock;
   if (const auto error = open(kernel, options, clock)) {
     fmt::print(stderr, "ftcs demo: {}\n", error->message());

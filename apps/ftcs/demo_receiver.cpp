@@ -36,7 +36,7 @@ std::vector<ServoConfig> demo_servos(const DemoOptions& demo, Nanoseconds interv
   return servos;
 }
 
-ptp::TimeReceiverConfig receiver_config(const PtpOptions& options) {
+ptp::TimeReceiverConfig receiver_config(const daemon::PtpOptions& options) {
   ptp::TimeReceiverConfig config;
   config.port = {*options.clock_identity, 1};
   config.domain = options.domain;
@@ -47,8 +47,8 @@ ptp::TimeReceiverConfig receiver_config(const PtpOptions& options) {
 
 }  // namespace
 
-DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
-                           const DemoOptions& demo, Log& log,
+DemoReceiver::DemoReceiver(platform::Kernel& kernel, const daemon::PtpOptions& options,
+                           const DemoOptions& demo, daemon::Log& log,
                            std::unique_ptr<platform::TimestampClock> timestamps,
                            platform::ChildProcess* transmitter)
     : PtpCorePort(kernel, options, log, std::move(timestamps), receiver_config(options)),
@@ -100,13 +100,13 @@ void DemoReceiver::housekeeping(FreeRunningTime) {
 int DemoReceiver::finish() {
   view_.finish();
   if (one_way_ns_.empty()) {
-    log()(LogLevel::kError, "no Sync message arrived on {} within {:.1f} s", options().interface,
-          seconds_since_start());
+    log()(daemon::LogLevel::kError, "no Sync message arrived on {} within {:.1f} s",
+          options().interface, seconds_since_start());
     return kRuntimeError;
   }
   interrupted_ = seconds_since_start() < demo_.duration_s;
   if (interrupted_) {
-    log()(LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
+    log()(daemon::LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
           seconds_since_start(), demo_.duration_s);
   }
   return kSuccess;

@@ -7,12 +7,12 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
-#include "apps/ftcs/management_server.h"
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/ptp_option_table.h"
-#include "apps/ftcs/ptp_port.h"
 #include "apps/ftcs/ptp_presets.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/daemon/management_server.h"
+#include "ftcs/daemon/ptp_port.h"
 #include "ftcs/platform/network_interface.h"
 
 namespace ftcs::app {
@@ -37,7 +37,7 @@ std::optional<std::string> ftcs_flag(const PtpArguments& arguments) {
   return std::nullopt;
 }
 
-Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_servo(const PtpArguments& arguments, daemon::PtpOptions& options) {
   ServoConfig& servo = options.servo;
   if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
   if (options.free_running) servo.kind = ServoKind::kFreeRunning;
@@ -72,22 +72,22 @@ Wrong apply_servo(const PtpArguments& arguments, PtpOptions& options) {
   return check_steering(servo, options.steering);
 }
 
-Wrong apply_clock(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_clock(const PtpArguments& arguments, daemon::PtpOptions& options) {
   const std::string& clock = arguments.clock;
   if (clock == "virtual") {
-    options.clock = ClockKind::kVirtual;
+    options.clock = daemon::ClockKind::kVirtual;
   } else if (clock == "system") {
-    options.clock = ClockKind::kSystem;
+    options.clock = daemon::ClockKind::kSystem;
   } else if (clock == "auto") {
-    options.clock = ClockKind::kAuto;
+    options.clock = daemon::ClockKind::kAuto;
   } else if (clock == "phc" || clock.starts_with("/dev/")) {
-    options.clock = ClockKind::kPhc;
+    options.clock = daemon::ClockKind::kPhc;
     if (clock != "phc") options.clock_device = clock;
   } else {
     return fmt::format("--clock: '{}': expected virtual, system, phc, /dev/ptpN or auto", clock);
   }
-  if (options.clock != ClockKind::kVirtual) {
-    if (options.role == Role::kTimeTransmitter)
+  if (options.clock != daemon::ClockKind::kVirtual) {
+    if (options.role == daemon::Role::kTimeTransmitter)
       return "a time transmitter steers no clock: --clock";
     if (!arguments.offset.empty()) return "--offset: only of the virtual clock";
     if (!arguments.skew.empty()) return "--skew: only of the virtual clock";
@@ -102,7 +102,7 @@ Wrong apply_clock(const PtpArguments& arguments, PtpOptions& options) {
   return std::nullopt;
 }
 
-Wrong apply_peer(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_peer(const PtpArguments& arguments, daemon::PtpOptions& options) {
   using platform::NetworkTransport;
   if (arguments.unicast.empty()) return std::nullopt;
   const NetworkTransport transport = options.socket.transport;
@@ -115,7 +115,7 @@ Wrong apply_peer(const PtpArguments& arguments, PtpOptions& options) {
   return fmt::format("--unicast: '{}' is not {} address", arguments.unicast, kind);
 }
 
-Wrong apply_trust(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
   for (const std::string& text : arguments.acceptable) {
     const auto identity = parse_clock_identity(text);
     if (!identity) {
@@ -127,7 +127,7 @@ Wrong apply_trust(const PtpArguments& arguments, PtpOptions& options) {
   return std::nullopt;
 }
 
-Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) {
   if (arguments.interfaces.size() > 1) return "-i: only one port is supported";
   if (!arguments.interfaces.empty()) {
     if (!options.interface.empty() && options.interface != arguments.interfaces.front()) {
@@ -138,9 +138,10 @@ Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
     options.interface = arguments.interfaces.front();
   }
   if (arguments.source == "ptp4l") {
-    options.source = Source::kPtp4l;
+    options.source = daemon::Source::kPtp4l;
     if (!arguments.ptp4l_socket.empty()) options.ptp4l_socket = arguments.ptp4l_socket;
-    if (options.role == Role::kTimeTransmitter) return "--source: only a time receiver has one";
+    if (options.role == daemon::Role::kTimeTransmitter)
+      return "--source: only a time receiver has one";
     return std::nullopt;  // the interface is ptp4l's to know
   }
   if (options.interface.empty()) return "no interface: give one with -i, for example -i eth0";
@@ -153,15 +154,15 @@ Wrong apply_network(const PtpArguments& arguments, PtpOptions& options) {
   return apply_peer(arguments, options);
 }
 
-Wrong apply_feed(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_feed(const PtpArguments& arguments, daemon::PtpOptions& options) {
   options.chrony_socket = arguments.chrony_socket;
   options.ntp_shm_unit = arguments.ntp_shm_unit;
   if (options.chrony_socket.empty() && !options.ntp_shm_unit) return std::nullopt;
   const char* const flag = options.ntp_shm_unit ? "--ntp-shm" : "--chrony-sock";
-  if (options.role == Role::kTimeTransmitter) {
+  if (options.role == daemon::Role::kTimeTransmitter) {
     return fmt::format("{}: a time transmitter follows nobody", flag);
   }
-  if (options.clock == ClockKind::kSystem || options.clock == ClockKind::kAuto) {
+  if (options.clock == daemon::ClockKind::kSystem || options.clock == daemon::ClockKind::kAuto) {
     return fmt::format(
         "{}: then two programs would steer the system clock; use --clock virtual or "
         "phc",
@@ -170,13 +171,13 @@ Wrong apply_feed(const PtpArguments& arguments, PtpOptions& options) {
   return std::nullopt;
 }
 
-Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
+Wrong apply_role(const PtpArguments& arguments, daemon::PtpOptions& options) {
   if (arguments.role == "time-transmitter") {
-    options.role = Role::kTimeTransmitter;
+    options.role = daemon::Role::kTimeTransmitter;
   } else if (arguments.role == "time-receiver" || arguments.receiver_only) {
-    options.role = Role::kTimeReceiver;
+    options.role = daemon::Role::kTimeReceiver;
   }
-  if (arguments.receiver_only && options.role == Role::kTimeTransmitter) {
+  if (arguments.receiver_only && options.role == daemon::Role::kTimeTransmitter) {
     return "-s asks for a time receiver, --role for a time transmitter";
   }
   for (const auto& [name, value] : arguments.settings) {
@@ -187,13 +188,13 @@ Wrong apply_role(const PtpArguments& arguments, PtpOptions& options) {
   }
   if (arguments.hardware) options.timestamps = platform::TimestampMode::kHardware;
   if (arguments.software) options.timestamps = platform::TimestampMode::kSoftware;
-  if (arguments.json) options.output = Output::kJson;
-  if (arguments.csv) options.output = Output::kCsv;
+  if (arguments.json) options.output = daemon::Output::kJson;
+  if (arguments.csv) options.output = daemon::Output::kCsv;
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
   return std::nullopt;
 }
 
-Wrong make_options(const PtpArguments& arguments, PtpOptions& options) {
+Wrong make_options(const PtpArguments& arguments, daemon::PtpOptions& options) {
   if (!arguments.preset.empty()) {
     if (auto wrong = apply_preset(options, arguments.preset)) return "--preset: " + *wrong;
   }
@@ -218,17 +219,17 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<PtpArguments>();
   add_ptp_arguments(*command, *arguments);
   command->callback([arguments, &exit_code] {
-    PtpOptions options;
+    daemon::PtpOptions options;
     if (const auto wrong = make_options(*arguments, options)) {
       fmt::print(stderr, "ftcs ptp: {}\n", *wrong);
       exit_code = kUsageError;
       return;
     }
     if (!options.uds_address_given) {
-      options.uds_address = platform::writable_socket_path(kSocketName);
+      options.uds_address = platform::writable_socket_path(daemon::kSocketName);
     }
     platform::LinuxKernel kernel;
-    exit_code = run_ptp(kernel, options);
+    exit_code = daemon::run_ptp(kernel, options);
   });
 }
 

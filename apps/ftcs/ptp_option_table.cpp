@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 
+#include "apps/ftcs/steering_arguments.h"
 #include "apps/ftcs/suggestion.h"
 #include "apps/ftcs/units.h"
 
@@ -64,7 +65,7 @@ Wrong only(std::string_view text, std::string_view supported) {
 
 Wrong interval(std::string_view text, std::int8_t& target) { return integer(text, target, -7, 7); }
 
-Wrong set_identity(PtpOptions& options, std::string_view text) {
+Wrong set_identity(daemon::PtpOptions& options, std::string_view text) {
   const auto identity = parse_clock_identity(text);
   if (!identity) return fmt::format("'{}': expected 001122.fffe.334455", text);
   if (*identity != ptp::ClockIdentity{}) options.clock_identity = identity;  // zero: the default
@@ -84,13 +85,13 @@ Wrong choose(std::string_view text, Value& target,
   return fmt::format("'{}' is not supported, only {}", text, words);
 }
 
-Wrong set_delay_mechanism(PtpOptions& options, std::string_view text) {
+Wrong set_delay_mechanism(daemon::PtpOptions& options, std::string_view text) {
   using ptp::DelayMechanism;
   return choose(text, options.delay_mechanism,
                 {{"E2E", DelayMechanism::kEndToEnd}, {"P2P", DelayMechanism::kPeerToPeer}});
 }
 
-Wrong set_transport(PtpOptions& options, std::string_view text) {
+Wrong set_transport(daemon::PtpOptions& options, std::string_view text) {
   const auto transport = platform::transport_from_name(text);
   if (!transport) return fmt::format("'{}' is not supported, only UDPv4, UDPv6 and L2", text);
   options.socket.transport = *transport;
@@ -104,17 +105,17 @@ Wrong mac(std::string_view text, platform::MacAddress& target) {
   return std::nullopt;
 }
 
-Wrong set_capable(PtpOptions& options, std::string_view text) {
+Wrong set_capable(daemon::PtpOptions& options, std::string_view text) {
   return choose(text, options.always_capable, {{"auto", false}, {"true", true}});
 }
 
-Wrong set_clock_servo(PtpOptions& options, std::string_view text) {
+Wrong set_clock_servo(daemon::PtpOptions& options, std::string_view text) {
   if (auto wrong = only(text, "pi")) return *wrong + " (--servo knows more)";
   options.servo.kind = ServoKind::kLinuxptpPi;
   return std::nullopt;
 }
 
-Wrong set_driftfile(PtpOptions& options, std::string_view text) {
+Wrong set_driftfile(daemon::PtpOptions& options, std::string_view text) {
   const std::filesystem::path path(text);
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   std::error_code ignored;
@@ -125,7 +126,7 @@ Wrong set_driftfile(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
-Wrong set_delay_filter(PtpOptions& options, std::string_view text) {
+Wrong set_delay_filter(daemon::PtpOptions& options, std::string_view text) {
   options.delay_filter_given = true;
   return choose(text, options.servo.two_way.path_delay.filter.kind,
                 {{"moving_median", DelayFilterKind::kMovingMedian},
@@ -133,18 +134,18 @@ Wrong set_delay_filter(PtpOptions& options, std::string_view text) {
                  {"steady_mean", DelayFilterKind::kSteadyMean}});
 }
 
-Wrong set_time_stamping(PtpOptions& options, std::string_view text) {
+Wrong set_time_stamping(daemon::PtpOptions& options, std::string_view text) {
   using platform::TimestampMode;
   return choose(text, options.timestamps,
                 {{"hardware", TimestampMode::kHardware}, {"software", TimestampMode::kSoftware}});
 }
 
-Wrong set_receiver_only(PtpOptions& options, std::string_view text) {
+Wrong set_receiver_only(daemon::PtpOptions& options, std::string_view text) {
   bool receiver_only = true;
   if (auto wrong = boolean(text, receiver_only)) return wrong;
   if (receiver_only) {
-    options.role = Role::kTimeReceiver;
-  } else if (options.role == Role::kTimeReceiver) {
+    options.role = daemon::Role::kTimeReceiver;
+  } else if (options.role == daemon::Role::kTimeReceiver) {
     options.notes.emplace_back(
         "slaveOnly 0: this port keeps the role it was given (--role) and never becomes a time "
         "transmitter by itself");
@@ -152,21 +153,21 @@ Wrong set_receiver_only(PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
-Wrong set_transmitter_only(PtpOptions& options, std::string_view text) {
+Wrong set_transmitter_only(daemon::PtpOptions& options, std::string_view text) {
   bool transmitter_only = false;
   if (auto wrong = boolean(text, transmitter_only)) return wrong;
-  if (transmitter_only) options.role = Role::kTimeTransmitter;
+  if (transmitter_only) options.role = daemon::Role::kTimeTransmitter;
   return std::nullopt;
 }
 
-Wrong set_timeout(PtpOptions& options, std::string_view text) {
+Wrong set_timeout(daemon::PtpOptions& options, std::string_view text) {
   std::int64_t milliseconds = 0;
   if (auto wrong = integer(text, milliseconds, 1, 10'000)) return wrong;
   options.socket.tx_timestamp_timeout = std::chrono::milliseconds{milliseconds};
   return std::nullopt;
 }
 
-Wrong set_uds_address(PtpOptions& options, std::string_view text) {
+Wrong set_uds_address(daemon::PtpOptions& options, std::string_view text) {
   options.uds_address = text == "none" ? "" : text;
   options.uds_address_given = true;
   return std::nullopt;
@@ -180,7 +181,8 @@ Wrong number_for(Wrong (*set)(double, Target&), std::string_view text, Target& t
   return set(value, target);
 }
 
-#define FTCS_SET(expression) [](PtpOptions& o, std::string_view v) -> Wrong { return expression; }
+#define FTCS_SET(expression) \
+  [](daemon::PtpOptions& o, std::string_view v) -> Wrong { return expression; }
 
 constexpr std::array kSettings{
     PtpSetting{"domainNumber", "PTP domain, 0 to 255", FTCS_SET(integer(v, o.domain, 0, 255))},
@@ -378,7 +380,7 @@ std::vector<std::string> fixed_setting_names() {
   return names;
 }
 
-std::optional<std::string> apply_setting(PtpOptions& options, std::string_view name,
+std::optional<std::string> apply_setting(daemon::PtpOptions& options, std::string_view name,
                                          std::string_view value) {
   for (const PtpSetting& setting : kSettings) {
     if (name != setting.name) continue;

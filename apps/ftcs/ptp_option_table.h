@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/ftcs/ptp_options.h"
+#include "ftcs/daemon/ptp_options.h"
 
 namespace ftcs::app {
 
@@ -16,7 +16,7 @@ struct PtpSetting {
   const char* name;
   const char* help;  ///< unit and range
   /// Returns what is wrong with the value, if anything.
-  std::optional<std::string> (*set)(PtpOptions& options, std::string_view value);
+  std::optional<std::string> (*set)(daemon::PtpOptions& options, std::string_view value);
 };
 
 /// "001122.fffe.334455"
@@ -31,7 +31,8 @@ struct PtpSetting {
 /// Applies one setting by ptp4l's name. Settings of ptp4l that have no effect here are accepted
 /// with the one value that describes what happens anyway (its default, mostly), and are an error
 /// with any other.
-[[nodiscard]] std::optional<std::string> apply_setting(PtpOptions& options, std::string_view name,
+[[nodiscard]] std::optional<std::string> apply_setting(daemon::PtpOptions& options,
+                                                       std::string_view name,
                                                        std::string_view value);
 
 }  // namespace ftcs::app

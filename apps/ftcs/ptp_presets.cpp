@@ -71,7 +71,7 @@ std::string preset_names() {
   return names;
 }
 
-std::optional<std::string> apply_preset(PtpOptions& options, std::string_view name) {
+std::optional<std::string> apply_preset(daemon::PtpOptions& options, std::string_view name) {
   for (const Preset& preset : kPresets) {
     if (name != preset.name) continue;
     for (const Value& value : preset.values) {

@@ -5,13 +5,14 @@
 #include <string>
 #include <string_view>
 
-#include "apps/ftcs/ptp_options.h"
+#include "ftcs/daemon/ptp_options.h"
 
 namespace ftcs::app {
 
 /// Settings that belong together, by the name of their profile. Configuration file and command line
 /// are applied after it.
-[[nodiscard]] std::optional<std::string> apply_preset(PtpOptions& options, std::string_view name);
+[[nodiscard]] std::optional<std::string> apply_preset(daemon::PtpOptions& options,
+                                                      std::string_view name);
 
 /// "default-e2e, default-p2p, gptp"
 [[nodiscard]] std::string preset_names();

@@ -7,8 +7,8 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/management_server.h"
-#include "apps/ftcs/status_report.h"
+#include "ftcs/daemon/management_server.h"
+#include "ftcs/daemon/status_report.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {
@@ -25,7 +25,7 @@ std::span<const std::uint8_t> octets(std::string_view text) {
 
 struct Answer {
   std::string json;
-  StatusForPeople for_people;
+  daemon::StatusForPeople for_people;
 };
 
 /// The answer, or what is wrong.
@@ -33,14 +33,14 @@ Result<Answer, std::string> ask(const std::string& path) {
   constexpr int kPatienceMs = 2000;
   auto client = platform::LocalSocket::client();
   if (!client) return client.error().message();
-  if (const auto error = client->send(path, octets(kStatusQuery))) return error->message();
+  if (const auto error = client->send(path, octets(daemon::kStatusQuery))) return error->message();
   client->wait(kPatienceMs);
   const auto answer = client->receive();
   if (!answer) {
     return fmt::format("socket {}: no answer within {} s; is that ftcs?", path, kPatienceMs / 1000);
   }
   std::string json(answer->bytes.begin(), answer->bytes.end());
-  auto status = read_status(json);
+  auto status = daemon::read_status(json);
   if (!status) return fmt::format("socket {}: the answer is no status of ftcs", path);
   return Answer{std::move(json), std::move(*status)};
 }
@@ -49,7 +49,7 @@ Result<Answer, std::string> ask(const std::string& path) {
 Result<Answer, std::string> ask_somebody(const std::string& given, const platform::StopFlag& stop) {
   if (!given.empty()) return ask(given);
   std::string tried;
-  for (const std::string& path : platform::usual_socket_paths(kSocketName)) {
+  for (const std::string& path : platform::usual_socket_paths(daemon::kSocketName)) {
     auto answer = ask(path);
     if (answer) return answer;
     if (stop.is_set()) break;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "ftcs/discipline/steering_rules.h"
 #include "ftcs/servo/any_servo.h"
 
 namespace CLI {
@@ -11,12 +12,6 @@ class App;  // the whole of it is for the files that add flags: it costs seconds
 }
 
 namespace ftcs::app {
-
-/// What may be asked of the clock beyond the limits that every servo has of its own.
-struct SteeringRules {
-  double largest_rate_change = 0.0;  ///< at a time, dimensionless; 0: any
-  bool never_step = false;           ///< whatever else permits a step
-};
 
 /// What `ftcs ptp` and `ftcs phc` both take about the servo and the clock it steers, as given.
 struct SteeringArguments {

@@ -83,7 +83,7 @@ TEST(SteeringArguments, limits_that_leave_no_rate_to_choose_contradict_each_othe
 }
 
 TEST(SteeringSettings, have_ptp4ls_units) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(read_config_text("[global]\n"
                              "max_frequency 500000\n"
                              "max_frequency_change 2000\n"
@@ -103,14 +103,14 @@ TEST(SteeringSettings, have_ptp4ls_units) {
 }
 
 TEST(SteeringSettings, a_max_frequency_of_zero_is_the_clocks_own_limit_as_with_ptp4l) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(read_config_text("[global]\nmax_frequency 100\nmax_frequency 0\n", "ptp.conf", options),
             std::nullopt);
   EXPECT_EQ(options.servo.limits.fastest, RateLimits{}.fastest);
 }
 
 TEST(SteeringSettings, errors_name_file_line_and_range) {
-  PtpOptions options;
+  daemon::PtpOptions options;
   EXPECT_EQ(read_config_text("[global]\nmax_frequency_change -1\n", "ptp.conf", options),
             "ptp.conf:2: max_frequency_change: -1 ppb: expected 0 to 9e+08 ppb");
   EXPECT_EQ(read_config_text("[global]\nmax_frequency -1\n", "ptp.conf", options),

@@ -10,9 +10,9 @@
 #include "apps/ftcs/config_file.h"
 #include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/number_check.h"
-#include "apps/ftcs/phc/phc_options.h"
-#include "apps/ftcs/phc/phc_runner.h"
 #include "apps/ftcs/steering_arguments.h"
+#include "ftcs/daemon/phc/phc_options.h"
+#include "ftcs/daemon/phc/phc_runner.h"
 
 namespace ftcs::app {
 namespace {
@@ -21,7 +21,7 @@ using Wrong = std::optional<std::string>;
 
 /// The command line as it was given.
 struct PhcArguments {
-  PhcOptions options;
+  daemon::PhcOptions options;
   SteeringArguments steering;
   EpochArguments epoch;
   std::string law;  ///< -E
@@ -48,9 +48,9 @@ void refuse(CLI::App& command, const char* flag, const char* reason, bool takes_
 
 /// What phc2sys reads of ptp4l's configuration file.
 void read_file(const std::string& path, PhcArguments& arguments) {
-  PtpOptions file;
+  daemon::PtpOptions file;
   if (const auto wrong = read_config_file(path, file)) throw CLI::ValidationError("-f", *wrong);
-  PhcOptions& options = arguments.options;
+  daemon::PhcOptions& options = arguments.options;
   options.port.domain = file.domain;
   options.port.major_sdo_id = file.major_sdo_id;
   if (file.uds_address_given) options.port.socket = file.uds_address;
@@ -69,7 +69,7 @@ void read_file(const std::string& path, PhcArguments& arguments) {
 }
 
 void add_clock_flags(CLI::App& command, PhcArguments& arguments) {
-  PhcOptions& options = arguments.options;
+  daemon::PhcOptions& options = arguments.options;
   // Before all others, which are read in this order: they win.
   command
       .add_option_function<std::string>(
@@ -141,7 +141,7 @@ void add_servo_flags(CLI::App& command, PhcArguments& arguments) {
 }
 
 void add_reading_flags(CLI::App& command, PhcArguments& arguments) {
-  PhcOptions& options = arguments.options;
+  daemon::PhcOptions& options = arguments.options;
   command.add_option("-R", options.rate_hz, "comparisons a second; default 1")
       ->type_name("HZ")
       ->check(number_from(1e-3, 1e3));
@@ -178,7 +178,7 @@ void refuse_the_rest(CLI::App& command) {
   refuse(command, "-M", "an NTP SHM segment is not supported", true);
 }
 
-Wrong apply_servo(const PhcArguments& arguments, PhcOptions& options) {
+Wrong apply_servo(const PhcArguments& arguments, daemon::PhcOptions& options) {
   ServoConfig& servo = options.servo;
   if (!arguments.law.empty()) {
     if (arguments.law != "pi") {
@@ -200,7 +200,7 @@ Wrong apply_servo(const PhcArguments& arguments, PhcOptions& options) {
   return check_steering(servo, options.steering);
 }
 
-Wrong apply_steps(const PhcArguments& arguments, PhcOptions& options) {
+Wrong apply_steps(const PhcArguments& arguments, daemon::PhcOptions& options) {
   const auto nanoseconds = [](double seconds) {
     return Nanoseconds{Duration::from_ns(seconds * 1e9).rounded_ns()};
   };
@@ -214,7 +214,7 @@ Wrong apply_steps(const PhcArguments& arguments, PhcOptions& options) {
   return std::nullopt;
 }
 
-Wrong apply_offset(PhcOptions& options) {
+Wrong apply_offset(daemon::PhcOptions& options) {
   const bool from_system = options.source == "CLOCK_REALTIME";
   const bool to_system = options.sink == "CLOCK_REALTIME";
   if (options.automatic || options.wait_for_port) return std::nullopt;  // the port knows
@@ -234,7 +234,7 @@ Wrong apply_offset(PhcOptions& options) {
 }
 
 /// -a -r and what does not go with it.
-Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) {
+Wrong check_automatic(const PhcArguments& arguments, const daemon::PhcOptions& options) {
   if (!options.automatic) {
     const bool for_wait = options.wait_for_port && arguments.system_clock > 1;
     return arguments.system_clock > 0 && !for_wait ? Wrong("-r is of -a, and -r -r of -w")
@@ -249,7 +249,7 @@ Wrong check_automatic(const PhcArguments& arguments, const PhcOptions& options) 
   return std::nullopt;
 }
 
-Wrong complete(const PhcArguments& arguments, PhcOptions& options) {
+Wrong complete(const PhcArguments& arguments, daemon::PhcOptions& options) {
   if (auto wrong = check_automatic(arguments, options)) return wrong;
   if (options.source.empty() && !options.automatic)
     return "no source: give one with -s, for example -s eth0";
@@ -275,15 +275,15 @@ void add_phc_command(CLI::App& app, int& exit_code) {
   add_reading_flags(*command, *arguments);
   refuse_the_rest(*command);
   command->callback([arguments, &exit_code] {
-    PhcOptions options = arguments->options;
+    daemon::PhcOptions options = arguments->options;
     if (const auto wrong = complete(*arguments, options)) {
       fmt::print(stderr, "ftcs phc: {}\n", *wrong);
       exit_code = kUsageError;
       return;
     }
     platform::LinuxKernel kernel;
-    Log log(kernel, stdout, options.log_level);
-    exit_code = run_phc(kernel, options, log);
+    daemon::Log log(kernel, stdout, options.log_level);
+    exit_code = daemon::run_phc(kernel, options, log);
   });
 }
 

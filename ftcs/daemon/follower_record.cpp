@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/follower_record.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "ftcs/daemon/real_clock.h"
+
+namespace ftcs::daemon {
+namespace {
+
+// A slew over more than this would take long enough to look like a fault: the user must ask for a
+// step.
+constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
+constexpr std::size_t kKeptRefusals = 8;
+
+StepPolicy step_policy(const PtpOptions& options) {
+  // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
+  // for.
+  if (options.servo.kind == ServoKind::kLinuxptpPi) {
+    if (options.step_threshold > Nanoseconds{0}) return {StepMode::kAlways, options.step_threshold};
+    if (options.first_step_threshold > Nanoseconds{0}) {
+      return {StepMode::kFirst, options.first_step_threshold};
+    }
+    return {};
+  }
+  if (!options.first_step) return {};
+  return {StepMode::kFirst, options.first_step_threshold};
+}
+
+/// Empty, with a notice, where the servo has nothing to keep.
+std::string driftfile(const PtpOptions& options, Log& log) {
+  if (options.driftfile.empty() || options.servo.kind == ServoKind::kAdaptive)
+    return options.driftfile;
+  log(LogLevel::kNotice, "driftfile {}: not used, the servo {} keeps no state", options.driftfile,
+      servo_kind_name(options.servo.kind));
+  return {};
+}
+
+/// What makes a learnt rate another clock's.
+std::string clock_name(const PtpOptions& options, bool hardware_stamps) {
+  const char* steered = options.clock == ClockKind::kVirtual  ? "virtual"
+                        : options.clock == ClockKind::kSystem ? "system"
+                                                              : "phc";
+  return fmt::format("{}, {} clock, {} timestamps, skew {} ppb", options.interface, steered,
+                     hardware_stamps ? "hardware" : "software", options.skew_ppb);
+}
+
+std::string holdover_text(const node::Note& note) {
+  return note.refused_syncs == 0 ? "no Sync"
+                                 : fmt::format("{} Syncs refused, no good one", note.refused_syncs);
+}
+
+std::string foreign_text(const node::Note& note) {
+  return fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
+                     note.difference_ns);
+}
+
+}  // namespace
+
+StateKeeper state_keeper(const PtpOptions& options, Log& log, bool hardware_stamps) {
+  return {log, driftfile(options, log), options.driftfile_interval,
+          clock_name(options, hardware_stamps)};
+}
+
+node::ClockFollowerConfig follower_config(const PtpOptions& options, bool hardware_stamps,
+                                          const std::optional<LearntState>& learnt) {
+  node::ClockFollowerConfig follower;
+  DisciplineConfig& config = follower.discipline;
+  config.servo = options.servo;
+  config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
+  config.servo.linuxptp_pi.step_threshold = options.step_threshold;
+  config.servo.linuxptp_pi.timestamping =
+      hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
+  config.servo.adaptive.steering.first_step_allowed = options.first_step;
+  config.servo.adaptive.learnt = learnt;
+  config.step = step_policy(options);
+  config.largest_first_offset = kLargestFirstOffset;
+  config.largest_rate_change = options.steering.largest_rate_change;
+  follower.peer_to_peer = options.peer_to_peer();
+  follower.filter_is_chosen = options.delay_filter_given;
+  return follower;
+}
+
+FollowerRecord::FollowerRecord(const PtpOptions& options, Log& log, StateKeeper& state,
+                               const ClockDiscipline& discipline, FreeRunningTime start,
+                               std::string label)
+    : options_(options),
+      log_(log),
+      state_(state),
+      discipline_(discipline),
+      start_(start),
+      label_(std::move(label)) {}
+
+std::optional<std::string> FollowerRecord::add(const node::Steered& steered, FreeRunningTime now,
+                                               std::optional<Duration> sync_interval) {
+  const Telemetry& telemetry = steered.telemetry;
+  const bool used = telemetry.verdict == SampleVerdict::kUsed;
+  const double time_s = (now - start_).seconds();
+  if (!used) keep_refusal(steered, time_s);
+  if (!steered.paces) return std::nullopt;
+  std::optional<std::string> failure;
+  if (telemetry.direction == Direction::kForward) {
+    failure = add_sync(steered, time_s, sync_interval);
+  }
+  follow_lock(now);
+  if (used && telemetry.locked) state_.note(telemetry.servo, now);
+  return failure;
+}
+
+std::optional<std::string> FollowerRecord::add_sync(const node::Steered& steered, double time_s,
+                                                    std::optional<Duration> sync_interval) {
+  const Telemetry& telemetry = steered.telemetry;
+  const bool used = telemetry.verdict == SampleVerdict::kUsed;
+  SampleRecord record;
+  record.time_s = time_s;
+  record.offset_known = telemetry.servo.offset_known;
+  record.offset = used ? telemetry.servo.offset : steered.perceived;
+  record.telemetry = telemetry;
+  if (used) {
+    status_.last = record;
+    status_.has_sample = true;
+    status_.last_local = steered.local;
+    last_used_ = steered.event;
+  }
+  return report(record, sync_interval);
+}
+
+// Of a clock that refuses, what may pass is a warning; what will not ends the run.
+std::optional<std::string> FollowerRecord::add(const node::Note& note) {
+  using node::NoteKind;
+  switch (note.kind) {
+    case NoteKind::kStampsShared:
+      log_(LogLevel::kInfo, "{}: the transmitter's peer delay messages measure time too", label_);
+      break;
+    case NoteKind::kStampsForeign:
+      log_(LogLevel::kInfo, "{}: {}; the link delay alone counts", label_, foreign_text(note));
+      break;
+    case NoteKind::kStampsDeparted:
+      log_(LogLevel::kWarning, "{}: {}; starting anew with the link delay", label_,
+           foreign_text(note));
+      break;
+    case NoteKind::kNeighbourIsAnother:
+      log_(LogLevel::kWarning,
+           "{}: the neighbour is not the transmitter any more; starting anew with the link delay",
+           label_);
+      break;
+    case NoteKind::kAnotherLink:
+      log_(LogLevel::kWarning, "{}: another link; starting anew with the link delay", label_);
+      break;
+    case NoteKind::kHoldover:
+      log_(LogLevel::kWarning, "{}: {} for a while; keeping the last rate (holdover)", label_,
+           holdover_text(note));
+      break;
+    case NoteKind::kFirstOffsetRefused:
+      return fmt::format(
+          "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or "
+          "allow one step (--first-step)",
+          note.offset.seconds(), kLargestFirstOffset.count() / 1e9,
+          options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
+    case NoteKind::kClockRefused:
+      if (node::is_lasting(note.error)) return describe("the clock", note.error);
+      log_(LogLevel::kWarning, "{}: {}", label_, describe("the clock", note.error));
+      break;
+  }
+  return std::nullopt;
+}
+
+void FollowerRecord::follow_lock(FreeRunningTime now) {
+  if (!locked()) {
+    locked_since_.reset();
+  } else if (!locked_since_) {
+    locked_since_ = now;
+  }
+}
+
+void FollowerRecord::keep_refusal(const node::Steered& steered, double time_s) {
+  const Telemetry& telemetry = steered.telemetry;
+  const bool known = telemetry.direction == Direction::kForward && telemetry.servo.offset_known;
+  status_.refusals.push_back({time_s, telemetry.direction, telemetry.verdict,
+                              known ? std::optional(steered.perceived.ns()) : std::nullopt});
+  if (status_.refusals.size() > kKeptRefusals) status_.refusals.pop_front();
+}
+
+FollowerRecord::Status FollowerRecord::status(FreeRunningTime now) const {
+  Status status = status_;
+  if (status.has_sample) status.last_age_s = (now - last_used_).seconds();
+  if (locked_since_) status.locked_for_s = (now - *locked_since_).seconds();
+  if (since_lock_.count() > 0) status.since_lock = since_lock_.text();
+  return status;
+}
+
+std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
+                                                  std::optional<Duration> sync_interval) {
+  switch (options_.output) {
+    case Output::kText:
+      break;
+    case Output::kJson:
+      fmt::print("{}\n", json_line(record));
+      break;
+    case Output::kCsv:
+      fmt::print("{}\n", csv_line(record));
+      break;
+  }
+  if (options_.output != Output::kText && std::fflush(stdout) != 0) {
+    return fmt::format("standard output: {}", std::strerror(errno));
+  }
+  if (!record.offset_known) return std::nullopt;
+  if (record.telemetry.locked && record.telemetry.verdict == SampleVerdict::kUsed) {
+    since_lock_.add(record);
+  }
+  report_text(record, sync_interval);
+  return std::nullopt;
+}
+
+void FollowerRecord::report_text(const SampleRecord& record,
+                                 std::optional<Duration> sync_interval) {
+  const std::uint64_t per_summary = samples_per_summary(sync_interval);
+  if (per_summary < 2 || record.telemetry.verdict != SampleVerdict::kUsed) {
+    log_(LogLevel::kInfo, "{}", ptp4l_line(record));
+    return;
+  }
+  recent_.add(record);
+  if (recent_.count() < per_summary) return;
+  log_(LogLevel::kInfo, "{}", recent_.text());
+  recent_.reset();
+}
+
+// As ptp4l: 2^(summary_interval - logSyncInterval) samples.
+std::uint64_t FollowerRecord::samples_per_summary(std::optional<Duration> sync_interval) const {
+  if (!sync_interval || *sync_interval <= Duration{}) return 1;
+  const double samples = std::exp2(options_.summary_interval) / sync_interval->seconds();
+  return samples < 2.0 ? 1 : static_cast<std::uint64_t>(std::llround(samples));
+}
+
+void FollowerRecord::log_summary() {
+  state_.save();
+  const DisciplineCounters& counters = discipline_.counters();
+  log_(LogLevel::kNotice, "summary: {}, {} samples used, {} rejected, {} steps",
+       locked() ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
+  if (since_lock_.count() > 0) {
+    log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
+  }
+}
+
+}  // namespace ftcs::daemon

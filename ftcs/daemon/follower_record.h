@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "ftcs/daemon/kept_state.h"
+#include "ftcs/daemon/log.h"
+#include "ftcs/daemon/ptp_options.h"
+#include "ftcs/daemon/sample_report.h"
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/node/clock_follower.h"
+#include "ftcs/node/follower_event.h"
+
+namespace ftcs::daemon {
+
+/// What is remembered and said of a clock that follows: a line for each sample, summaries, notes as
+/// log lines, what was learnt in the driftfile, the status for whoever asks. Decides nothing.
+class FollowerRecord {
+ public:
+  /// State and discipline must outlive the record. `label` begins log lines: "port 1 (eth0)".
+  FollowerRecord(const PtpOptions& options, Log& log, StateKeeper& state,
+                 const ClockDiscipline& discipline, FreeRunningTime start, std::string label);
+
+  /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
+  [[nodiscard]] std::optional<std::string> add(const node::Steered& steered, FreeRunningTime now,
+                                               std::optional<Duration> sync_interval);
+  [[nodiscard]] std::optional<std::string> add(const node::Note& note);
+  /// Once per turn of the loop.
+  void follow_lock(FreeRunningTime now);
+  /// At the end: the summary's lines; what was learnt goes to the driftfile.
+  void log_summary();
+
+  [[nodiscard]] bool locked() const { return discipline_.locked(); }
+  /// Of all used samples since the first lock.
+  [[nodiscard]] double offset_rms_ns() const { return since_lock_.offset_rms(); }
+  [[nodiscard]] const ClockDiscipline& discipline() const { return discipline_; }
+
+  /// A message that did not steer, and why.
+  struct Refusal {
+    double time_s = 0.0;
+    Direction direction = Direction::kForward;
+    SampleVerdict verdict = SampleVerdict::kRejected;
+    std::optional<double> offset_ns{};
+  };
+  /// What is known now, for whoever asks.
+  struct Status {
+    SampleRecord last{};  ///< the last Sync that was used
+    bool has_sample = false;
+    LocalTime last_local{};  ///< when it came, on the steered clock
+    double last_age_s = 0.0;
+    std::optional<double> locked_for_s{};  ///< none: not locked
+    std::deque<Refusal> refusals{};        ///< the latest ones, oldest first
+    std::string since_lock{};              ///< ptp4l's summary of all samples since the first lock
+  };
+  [[nodiscard]] Status status(FreeRunningTime now) const;
+
+ private:
+  [[nodiscard]] std::optional<std::string> add_sync(const node::Steered& steered, double time_s,
+                                                    std::optional<Duration> sync_interval);
+  [[nodiscard]] std::optional<std::string> report(const SampleRecord& record,
+                                                  std::optional<Duration> sync_interval);
+  void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
+  void keep_refusal(const node::Steered& steered, double time_s);
+  [[nodiscard]] std::uint64_t samples_per_summary(std::optional<Duration> sync_interval) const;
+
+  const PtpOptions& options_;
+  Log& log_;
+  StateKeeper& state_;
+  const ClockDiscipline& discipline_;
+  FreeRunningTime start_;
+  std::string label_;
+  SampleSummary recent_;
+  SampleSummary since_lock_;
+  Status status_;
+  FreeRunningTime last_used_{};
+  std::optional<FreeRunningTime> locked_since_{};
+};
+
+/// Where what the servo learns is kept, as the options say.
+[[nodiscard]] StateKeeper state_keeper(const PtpOptions& options, Log& log, bool hardware_stamps);
+/// The follower that the options ask for.
+[[nodiscard]] node::ClockFollowerConfig follower_config(const PtpOptions& options,
+                                                        bool hardware_stamps,
+                                                        const std::optional<LearntState>& learnt);
+/// What a driftfile is for: at the known rate from now on, long before the first message.
+template <class Follower>
+void start_at_known_rate(const StateKeeper& state, Follower& follower, Log& log,
+                         const std::string& label) {
+  if (!state.learnt()) return;
+  const Rate rate = Rate::from_ratio(1.0 / (1.0 + state.learnt()->rate_deviation));
+  if (follower.start_at(rate))
+    log(LogLevel::kWarning, "{}: the clock refuses the driftfile's rate", label);
+}
+
+}  // namespace ftcs::daemon

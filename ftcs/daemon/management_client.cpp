@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/management_client.h"
+
+namespace ftcs::daemon {
+
+Result<ManagementClient, platform::OsError> ManagementClient::open(const PortAddress& address) {
+  auto socket = platform::LocalSocket::client();
+  if (!socket) return socket.error();
+  return ManagementClient(address, std::move(*socket));
+}
+
+// To all ports, as pmc -b 0 asks.
+void ManagementClient::ask(ptp::ManagementId id) {
+  ptp::ManagementMessage question;
+  question.header.domain = address_.domain;
+  question.header.major_sdo_id = address_.major_sdo_id;
+  question.header.minor_version = 0;  // every version of linuxptp takes it
+  question.body.target.clock.octets.fill(0xFF);
+  question.body.target.port = 0xFFFF;
+  question.id = id;
+  (void)socket_.send(address_.socket, ptp::encode_management(question).view());
+}
+
+std::optional<ptp::ManagementData> ManagementClient::next_answer() {
+  while (const auto datagram = socket_.receive()) {
+    const auto message = ptp::decode_management(datagram->bytes);
+    if (message && message->data) return *message->data;
+  }
+  return std::nullopt;
+}
+
+}  // namespace ftcs::daemon

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// World: a ptp4l on a socket in a temporary folder, which answers late.
+#include "ftcs/daemon/management_client.h"
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+namespace ftcs::daemon {
+namespace {
+
+using platform::LocalSocket;
+
+constexpr int kPatienceMs = 20;
+constexpr std::uint8_t kPeerToPeer = 2;
+
+std::string receive_question(LocalSocket& ptp4l) {
+  ptp4l.wait(10'000);
+  const auto question = ptp4l.receive();
+  return question ? question->sender : std::string{};
+}
+
+void answer(LocalSocket& ptp4l, const std::string& client, ptp::ManagementId id,
+            const ptp::ManagementData& data) {
+  ptp::ManagementMessage message;
+  message.body.action = static_cast<std::uint8_t>(ptp::ManagementAction::kResponse);
+  message.id = id;
+  message.data = data;
+  EXPECT_FALSE(ptp4l.send(client, ptp::encode_management(message).view()));
+}
+
+TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) {
+  std::string folder = (std::filesystem::temp_directory_path() / "ftcs-client-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  PortAddress address;
+  address.socket = folder + "/ptp4l";
+  auto ptp4l = LocalSocket::bind(address.socket);
+  ASSERT_TRUE(ptp4l.ok());
+  auto client = ManagementClient::open(address);
+  ASSERT_TRUE(client.ok());
+  EXPECT_FALSE(client->ask_and_wait<ptp::PortPropertiesNp>(ptp::ManagementId::kPortPropertiesNp,
+                                                           kPatienceMs));
+
+  std::thread late([&] {
+    const std::string asker = receive_question(*ptp4l);
+    EXPECT_EQ(receive_question(*ptp4l), asker);
+    answer(*ptp4l, asker, ptp::ManagementId::kPortPropertiesNp, ptp::PortPropertiesNp{});
+    std::this_thread::sleep_for(std::chrono::milliseconds{kPatienceMs});
+    ptp::PortDataSet port;
+    port.delay_mechanism = kPeerToPeer;
+    answer(*ptp4l, asker, ptp::ManagementId::kPortDataSet, port);
+  });
+  const auto port =
+      client->ask_and_wait<ptp::PortDataSet>(ptp::ManagementId::kPortDataSet, 50 * kPatienceMs);
+  late.join();
+  ASSERT_TRUE(port.has_value());
+  EXPECT_EQ(port->delay_mechanism, kPeerToPeer);
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace ftcs::daemon

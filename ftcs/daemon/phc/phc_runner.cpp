@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/phc/phc_runner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "ftcs/daemon/exit_code.h"
+#include "ftcs/platform/stop_flag.h"
+
+namespace ftcs::daemon {
+namespace {
+
+using platform::ClockAccess;
+using platform::ClockDevice;
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
+DisciplineConfig discipline_config(const PhcOptions& options, bool exact) {
+  DisciplineConfig config;
+  config.servo = options.servo;
+  config.largest_rate_change = options.steering.largest_rate_change;
+  config.servo.sync_interval =
+      Nanoseconds{static_cast<std::int64_t>(static_cast<double>(kNsPerSecond) / options.rate_hz)};
+  if (exact) config.servo.two_way.fixed_path_delay = Nanoseconds{0};
+  config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
+  config.servo.linuxptp_pi.step_threshold = options.step_threshold;
+  if (options.step_threshold > Nanoseconds{0}) {
+    config.step = {StepMode::kAlways, options.step_threshold};
+  } else if (options.first_step_threshold > Nanoseconds{0}) {
+    config.step = {StepMode::kFirst, options.first_step_threshold};
+  }
+  return config;
+}
+
+Result<UtcConfig, std::string> utc_config(const PhcOptions& options) {
+  UtcConfig utc;
+  utc.epoch = options.epoch;
+  if (options.free_running) utc.epoch = {true, 0, {}, {}, {}};  // comparing alone harms nothing
+  utc.kernel_leap = options.kernel_leap;
+  if (options.leap_file.empty()) return utc;
+  auto list = LeapSeconds::read_file(options.leap_file);
+  if (!list) return list.error();
+  utc.leap_seconds = std::move(*list);
+  return utc;
+}
+
+}  // namespace
+
+Result<ClockDevice, platform::OsError> open_clock(platform::Kernel& kernel, const std::string& name,
+                                                  ClockAccess access) {
+  if (name == "CLOCK_REALTIME") return ClockDevice::open_system(kernel, access);
+  if (name.find('/') != std::string::npos) return ClockDevice::open_phc(kernel, name, access);
+  return ClockDevice::open_phc_of(kernel, name, access);
+}
+
+Result<std::unique_ptr<PhcRunner>, std::string> PhcRunner::open(platform::Kernel& kernel,
+                                                                const PhcOptions& options,
+                                                                Log& log) {
+  auto utc = utc_config(options);
+  if (!utc) return utc.error();
+  auto source = open_clock(kernel, options.source, ClockAccess::kRead);
+  if (!source) return source.error().message();
+  const ClockAccess access = options.free_running ? ClockAccess::kRead : ClockAccess::kSteer;
+  auto device = open_clock(kernel, options.sink, access);
+  if (!device) return device.error().message();
+  auto comparison = ClockComparison::make(kernel, *source, *device);
+  if (!comparison) return comparison.error();
+  const std::string name = device->name();
+  utc->reference_is_utc = source->is_system();
+  platform::KernelClock clock(std::move(*device), options.servo.limits, !options.free_running);
+  if (const auto error = clock.failure()) return describe(name, *error);
+  auto sink = std::make_unique<RealClock>(kernel, log, std::move(clock), std::move(*utc));
+  // Not make_unique: the constructor is private.
+  return std::unique_ptr<PhcRunner>(new PhcRunner(
+      kernel, options, log, {std::move(*source), std::move(sink), std::move(*comparison)}));
+}
+
+PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks)
+    : kernel_(kernel),
+      options_(options),
+      log_(log),
+      source_(std::move(clocks.source)),
+      sink_(std::move(clocks.sink)),
+      comparison_(std::move(clocks.comparison)),
+      discipline_(discipline_config(options, comparison_.is_exact()), sink_->clock()) {
+  // With -O the sink shows the source's time plus a constant; else the source is TAI.
+  if (options.sink_ahead_s) {
+    const int ahead_of_utc = sink_->is_system() ? -*options.sink_ahead_s : UtcConfig{}.utc_offset;
+    sink_->set_fixed_scale(ahead_of_utc, *options.sink_ahead_s);
+    return;
+  }
+  if (options.automatic || options.wait_for_port) return;  // the port will tell
+  ReferenceScale scale;
+  scale.tai = sink_->is_system();
+  sink_->set_reference_scale(scale);
+}
+
+void PhcRunner::follow_port(PortWatch watch, const std::optional<Pairing>& pairing) {
+  watch_.emplace(std::move(watch));
+  pairing_ = pairing;
+  following_ = false;
+}
+
+std::optional<PortWatch> PhcRunner::take_moved_port() {
+  return port_moved_ ? std::exchange(watch_, std::nullopt) : std::nullopt;
+}
+
+void PhcRunner::set_scale() {
+  const PortWatch::Port& port = *watch_->port();
+  if (options_.sink_ahead_s ||
+      std::exchange(scales_heard_, port.scale_answers) == port.scale_answers)
+    return;
+  sink_->set_reference_scale(port.scale);
+}
+
+// Before the next sample, which would be seconds off. The clock is never stepped for it.
+void PhcRunner::follow_scale_change() {
+  if (sink_->take_scale_change()) discipline_.on_new_reference();
+}
+
+// A port that transmits follows nobody: its adapter's clock may show anything, unless the system
+// clock leads it or was said to.
+bool PhcRunner::port_is_usable() const {
+  if (watch_->is_receiving()) return true;
+  return watch_->is_transmitting() && (source_.is_system() || options_.system_may_lead);
+}
+
+bool PhcRunner::may_follow() {
+  if (!watch_) return true;
+  watch_->attend(kernel_.clock_ns(CLOCK_MONOTONIC_RAW));
+  bool may = port_is_usable();
+  if (pairing_) {
+    const auto wanted = pairing(*watch_, options_.system_may_lead);
+    may = wanted == pairing_;
+    port_moved_ = wanted && !may;
+  }
+  if (may) set_scale();
+  if (may == following_) return may;
+  following_ = may;
+  const std::string_view state =
+      watch_->port() ? to_string(watch_->port()->state) : std::string_view{"silent"};
+  log_(LogLevel::kNotice, "the PTP port is {}: {}", state,
+       may           ? "following"
+       : port_moved_ ? "another clock is to follow now"
+                     : "keeping the last rate");
+  if (may && discipline_.counters().commands > 0) discipline_.on_new_reference();
+  return may;
+}
+
+int PhcRunner::run() {
+  log_(LogLevel::kInfo, "{} {} {} (compared by {}; servo {})", sink_->name(),
+       options_.free_running ? "is compared with" : "follows", source_.name(), comparison_.method(),
+       servo_kind_name(options_.servo.kind));
+  const platform::StopFlag stop;
+  const std::int64_t start = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  next_raw_ns_ = start;
+  const auto is_over = [&] {
+    return options_.duration &&
+           kernel_.clock_ns(CLOCK_MONOTONIC_RAW) - start >= options_.duration->floor_ns();
+  };
+  while (!stop.is_set() && !failure_ && !port_moved_ && !is_over()) {
+    wait();
+    const bool may = may_follow();
+    follow_scale_change();
+    if (kernel_.clock_ns(CLOCK_MONOTONIC_RAW) >= next_raw_ns_) {
+      schedule_next();
+      if (may) {
+        take_sample();
+      } else {
+        (void)discipline_.on_silence();
+      }
+    }
+    const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
+                                     discipline_.latest().servo);
+    if (wrong) fail(*wrong);
+    follow_scale_change();
+  }
+  sink_->stop();
+  if (!failure_) failure_ = sink_->refusal();
+  if (failure_) {
+    log_(LogLevel::kError, "{}", *failure_);
+    return kRuntimeError;
+  }
+  return finish();
+}
+
+// Until the next reading is due or a correction has to end.
+void PhcRunner::wait() {
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  constexpr std::int64_t kLongestMs = 250;  // a signal just before poll(2) is noticed after this
+  const std::int64_t until_sample = next_raw_ns_ - kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  if (until_sample <= 0) return;
+  sink_->before_wait(until_sample);
+  pollfd timer{sink_->wake_descriptor(), POLLIN, 0};
+  const std::int64_t ms = std::min((until_sample + kNsPerMs - 1) / kNsPerMs, kLongestMs);
+  if (kernel_.poll({&timer, 1}, static_cast<int>(ms)) > 0) sink_->on_wake();
+}
+
+void PhcRunner::schedule_next() {
+  const auto period =
+      static_cast<std::int64_t>(static_cast<double>(kNsPerSecond) / options_.rate_hz);
+  const std::int64_t now = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  next_raw_ns_ += period;
+  if (next_raw_ns_ <= now) next_raw_ns_ = now + period;  // a long pause is not made up for
+}
+
+void PhcRunner::take_sample() {
+  const auto comparison = comparison_.read(options_.readings);
+  if (!comparison) {
+    const auto& error = comparison.error();
+    if (error.kind == platform::OsErrorKind::kNoSuchDevice) return fail(error.message());
+    if (!reading_failed_) log_(LogLevel::kWarning, "{}", error.message());
+    reading_failed_ = true;
+    (void)discipline_.on_silence();
+    return;
+  }
+  reading_failed_ = false;
+  const auto instant = sink_->clock().from_stamp(comparison->sink_ns);
+  if (!instant) return;  // somebody has just stepped the clock
+  if (!sink_->admits(ReferenceTime::from_ns(comparison->source_ns), *instant)) {
+    (void)discipline_.on_silence();
+    return;
+  }
+  // As it was read, before the servo acts on it.
+  const Duration offset = offset_from_reference(sink_->clock().local_of(comparison->sink_ns),
+                                                ReferenceTime::from_ns(comparison->source_ns));
+  const std::uint64_t steps = discipline_.counters().steps;
+  if (!comparison_.is_exact()) feed(Direction::kBackward, *comparison, *instant);
+  feed(Direction::kForward, *comparison, *instant);
+  if (!failure_) report(offset, comparison->delay_ns, discipline_.counters().steps > steps);
+}
+
+void PhcRunner::feed(Direction direction, const Comparison& comparison, FreeRunningTime instant) {
+  const Duration half = Duration::from_whole_ns(comparison.delay_ns).half();
+  const auto source = ReferenceTime::from_ns(comparison.source_ns);
+  const Telemetry telemetry = discipline_.on_pair(
+      {direction, direction == Direction::kForward ? source - half : source + half, instant});
+  if (telemetry.error) {
+    const std::string text = describe(sink_->name(), *telemetry.error);
+    if (*telemetry.error == ClockError::kBusy || *telemetry.error == ClockError::kRateOutOfLimits) {
+      if (!clock_refuses_) log_(LogLevel::kWarning, "{}", text);
+    } else {
+      fail(text);
+    }
+  }
+  clock_refuses_ = telemetry.error.has_value();
+}
+
+void PhcRunner::report(Duration offset, std::int64_t delay_ns, bool stepped) {
+  SampleRecord record;
+  record.telemetry = discipline_.latest();
+  record.offset = offset;  // as it was seen, whatever the servo made of it
+  record.telemetry.servo.path_delay = Duration::from_whole_ns(delay_ns);
+  if (stepped) record.telemetry.servo.state = ServoState::kJump;
+  const bool used = record.telemetry.verdict == SampleVerdict::kUsed;
+  if (used && record.telemetry.locked) since_lock_.add(record);
+  if (options_.samples_per_summary < 2 || !used) {
+    log_(LogLevel::kInfo, "{}",
+         phc2sys_line(record, sink_->name(), source_.is_system() ? "sys" : "phc"));
+    return;
+  }
+  recent_.add(record);
+  if (recent_.count() < options_.samples_per_summary) return;
+  log_(LogLevel::kInfo, "{} {}", sink_->name(), recent_.text());
+  recent_.reset();
+}
+
+void PhcRunner::fail(const std::string& reason) {
+  if (!failure_) failure_ = reason;
+}
+
+int PhcRunner::finish() {
+  const DisciplineCounters& counters = discipline_.counters();
+  const bool locked = discipline_.locked();
+  log_(LogLevel::kNotice, "summary: {}, {} readings used, {} rejected, {} steps",
+       locked ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
+  if (since_lock_.count() > 0) {
+    log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
+  }
+  return locked ? kSuccess : kNotLocked;
+}
+
+namespace {
+
+/// -a: until the port's state says which clock follows which. No value: stopped before.
+std::optional<Pairing> wait_for_pairing(platform::Kernel& kernel, const PhcOptions& options,
+                                        Log& log, PortWatch& watch) {
+  constexpr int kTurnMs = 50;
+  const platform::StopFlag stop;
+  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
+  std::optional<ptp::PortState> said;
+  for (std::int64_t now = start;; now = kernel.clock_ns(CLOCK_MONOTONIC_RAW)) {
+    if (auto wanted = pairing(watch, options.system_may_lead)) return wanted;
+    if (watch.port() && watch.port()->state != said) {
+      said = watch.port()->state;
+      log(LogLevel::kNotice, "the PTP port is {}: waiting", to_string(*said));
+    }
+    if (stop.is_set()) return std::nullopt;
+    if (options.duration && now - start >= options.duration->floor_ns()) return std::nullopt;
+    watch.attend(now);
+    (void)kernel.poll({}, kTurnMs);
+  }
+}
+
+/// -a: one run after another, each with the clocks that the port then asks for.
+int run_automatic(platform::Kernel& kernel, PhcOptions options, Log& log, PortWatch watch) {
+  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
+  const auto duration = options.duration;
+  const auto first_step = options.first_step_threshold;
+  std::set<std::string> steered;
+  for (;;) {
+    if (duration) {
+      const std::int64_t gone = kernel.clock_ns(CLOCK_MONOTONIC_RAW) - start;
+      options.duration = *duration - Duration::from_whole_ns(gone);
+    }
+    const auto wanted = wait_for_pairing(kernel, options, log, watch);
+    if (!wanted) return kNotLocked;
+    if (!watch.port()->hardware_timestamps) {
+      log(LogLevel::kError,
+          "the PTP port on {} takes software timestamps: its clock is the system clock already",
+          wanted->interface);
+      return kRuntimeError;
+    }
+    const std::string system = "CLOCK_REALTIME";
+    options.source = wanted->port_leads ? wanted->interface : system;
+    options.sink = wanted->port_leads ? system : wanted->interface;
+    // A clock that was near its source is not to jump because it has another one now.
+    options.first_step_threshold = steered.contains(options.sink) ? Nanoseconds{0} : first_step;
+    auto runner = PhcRunner::open(kernel, options, log);
+    if (!runner) {
+      log(LogLevel::kError, "{}", runner.error());
+      return kRuntimeError;
+    }
+    (*runner)->follow_port(std::move(watch), wanted);
+    const int code = (*runner)->run();
+    auto moved = (*runner)->take_moved_port();
+    if (!moved || code == kRuntimeError) return code;
+    if ((*runner)->has_steered()) steered.insert(options.sink);
+    watch = std::move(*moved);
+  }
+}
+
+}  // namespace
+
+int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log) {
+  const auto refuse = [&log](const std::string& reason) {
+    log(LogLevel::kError, "{}", reason);
+    return kRuntimeError;
+  };
+  std::optional<PortWatch> watch;
+  if (options.automatic || options.wait_for_port) {
+    auto opened = PortWatch::open(options.port);
+    if (!opened) return refuse(opened.error().message());
+    watch.emplace(std::move(*opened));
+    const PortAddress& port = options.port;
+    log(LogLevel::kNotice,
+        "waiting for the PTP port at {}, domain {}, transportSpecific {} (-z, -n and "
+        "--transportSpecific name another)",
+        port.socket, port.domain, port.major_sdo_id);
+  }
+  if (options.automatic) return run_automatic(kernel, options, log, std::move(*watch));
+  auto runner = PhcRunner::open(kernel, options, log);
+  if (!runner) return refuse(runner.error());
+  if (watch) (*runner)->follow_port(std::move(*watch), std::nullopt);
+  return (*runner)->run();
+}
+
+}  // namespace ftcs::daemon

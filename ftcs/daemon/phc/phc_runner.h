@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "ftcs/daemon/log.h"
+#include "ftcs/daemon/phc/clock_comparison.h"
+#include "ftcs/daemon/phc/phc_options.h"
+#include "ftcs/daemon/phc/port_watch.h"
+#include "ftcs/daemon/real_clock.h"
+#include "ftcs/daemon/sample_report.h"
+#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/platform/clock_device.h"
+
+namespace ftcs::daemon {
+
+/// "CLOCK_REALTIME", "/dev/ptp0", or the hardware clock of a network interface.
+[[nodiscard]] Result<platform::ClockDevice, platform::OsError> open_clock(
+    platform::Kernel& kernel, const std::string& name, platform::ClockAccess access);
+
+/// One clock of the kernel that follows another of the same machine.
+///
+/// Each comparison is a two-way exchange: the reading before the source was latched and the one
+/// after it bound the instant from both sides, and what either took longer than usual is delay, as
+/// a packet's. So a slow reading counts for less by itself, and for nothing as an outlier.
+class PhcRunner {
+ public:
+  /// Opens what the options name. The error is one line for the user; no clock has been touched.
+  [[nodiscard]] static Result<std::unique_ptr<PhcRunner>, std::string> open(
+      platform::Kernel& kernel, const PhcOptions& options, Log& log);
+
+  /// From now on it steers only while that PTP port is synchronised (`pairing`: while that is what
+  /// it asks for, and the run ends when it asks for another), and takes UTC from it. Before run().
+  void follow_port(PortWatch watch, const std::optional<Pairing>& pairing);
+  /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
+  [[nodiscard]] int run();
+  /// After a run that ended because the port asks for another pairing; otherwise no value.
+  [[nodiscard]] std::optional<PortWatch> take_moved_port();
+  [[nodiscard]] bool has_steered() const { return discipline_.counters().commands > 0; }
+
+ private:
+  struct Clocks {
+    platform::ClockDevice source;
+    std::unique_ptr<RealClock> sink;
+    ClockComparison comparison;
+  };
+  PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
+
+  void wait();
+  void follow_scale_change();
+  [[nodiscard]] bool may_follow();
+  [[nodiscard]] bool port_is_usable() const;
+  void set_scale();
+  void schedule_next();
+  void take_sample();
+  void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
+  void report(Duration offset, std::int64_t delay_ns, bool stepped);
+  void fail(const std::string& reason);
+  [[nodiscard]] int finish();
+
+  platform::Kernel& kernel_;
+  PhcOptions options_;
+  Log& log_;
+  platform::ClockDevice source_;
+  std::unique_ptr<RealClock> sink_;
+  ClockComparison comparison_;
+  ClockDiscipline discipline_;
+  std::optional<PortWatch> watch_;
+  std::optional<Pairing> pairing_;
+  bool port_moved_ = false;
+  bool following_ = true;
+  std::uint64_t scales_heard_ = 0;
+  SampleSummary recent_;
+  SampleSummary since_lock_;
+  std::int64_t next_raw_ns_ = 0;
+  bool reading_failed_ = false;
+  bool clock_refuses_ = false;
+  std::optional<std::string> failure_;
+};
+
+/// Everything that `ftcs phc` does once its options are known to be consistent.
+[[nodiscard]] int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log);
+
+}  // namespace ftcs::daemon

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ptp_receiver.h"
+
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/status_report.h"
+
+namespace ftcs::daemon {
+namespace {
+
+node::ReceiverNodeConfig node_config(const PtpOptions& options, const PortFacts& facts,
+                                     const StateKeeper& state, std::uint64_t seed) {
+  node::ReceiverNodeConfig node;
+  node.follower = follower_config(options, facts.hardware_stamps, state.learnt());
+  ptp::TimeReceiverConfig& config = node.port;
+  config.port = facts.identity;
+  config.domain = options.domain;
+  config.major_sdo_id = options.major_sdo_id;
+  config.minor_version = options.minor_version;
+  config.log_announce_interval = options.log_announce_interval;
+  config.announce_receipt_timeout = options.announce_receipt_timeout;
+  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
+  config.unicast = options.socket.unicast.has_value();
+  config.hybrid = options.hybrid;
+  config.delay_mechanism = options.delay_mechanism;
+  config.peer_delay = options.peer_delay_config();
+  config.assume_two_step = options.assume_two_step;
+  config.sync_receipt_timeout = options.sync_receipt_timeout;
+  config.acceptable = options.acceptable;
+  config.fast_start = options.fast_start;
+  config.delay_asymmetry = options.delay_asymmetry;
+  config.seed = seed;
+  return node;
+}
+
+}  // namespace
+
+PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+                         std::unique_ptr<platform::TimestampClock> timestamps,
+                         const PortFacts& facts, RealClock* real_clock)
+    : PtpPort(kernel, options, log, std::move(timestamps), real_clock),
+      state_(state_keeper(this->options(), log, facts.hardware_stamps)),
+      node_(node_config(this->options(), facts, state_,
+                        static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW))),
+            clock(), gate()),
+      record_(this->options(), log, state_, node_.discipline(), now(),
+              "port 1 (" + options.interface + ")"),
+      facts_(facts) {
+  start_at_known_rate(state_, node_, log, "port 1 (" + options.interface + ")");
+}
+
+void PtpReceiver::start(FreeRunningTime now) {
+  if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
+  node_.start(now);
+  take_events(now);
+}
+
+void PtpReceiver::on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                           FreeRunningTime now) {
+  node_.on_event_message(bytes, received, now);
+  take_events(now);
+}
+
+void PtpReceiver::on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) {
+  node_.on_general_message(bytes, now);
+  take_events(now);
+}
+
+void PtpReceiver::on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
+                          FreeRunningTime now) {
+  if (sent) {
+    node_.on_transmit_timestamp(id, *sent, now);
+  } else {
+    node_.on_transmit_timestamp_missing(id, now);
+  }
+  take_events(now);
+}
+
+void PtpReceiver::on_timer(FreeRunningTime now) {
+  node_.on_timer(now);
+  take_events(now);
+}
+
+void PtpReceiver::on_link_change(bool up, FreeRunningTime now) {
+  if (up) {
+    node_.on_link_up(now);
+  } else {
+    node_.on_link_down(now);
+  }
+  take_events(now);
+}
+
+void PtpReceiver::take_events(FreeRunningTime now) {
+  while (const auto event = node_.next()) take(*event, now);
+}
+
+void PtpReceiver::take(const node::ReceiverEvent& event, FreeRunningTime now) {
+  if (const auto* action = std::get_if<ptp::Action>(&event)) {
+    perform(*action);
+    tell(*action);
+  } else if (has_failed()) {
+    return;  // nothing is recorded after it
+  } else if (const auto* note = std::get_if<node::Note>(&event)) {
+    if (const auto wrong = record_.add(*note)) fail(*wrong);
+  } else if (const auto* steered = std::get_if<node::Steered>(&event)) {
+    if (const auto wrong = record_.add(*steered, now, node_.port().sync_interval())) fail(*wrong);
+    if (steered->paces) feed_others(record_);
+  }
+}
+
+void PtpReceiver::tell(const ptp::Action& action) {
+  if (const auto* seen = std::get_if<ptp::TransmitterSeen>(&action)) {
+    log()(LogLevel::kNotice, "port 1 ({}): new foreign master {}", options().interface,
+          to_text(seen->port).view());
+  } else if (const auto* selected = std::get_if<ptp::TransmitterSelected>(&action)) {
+    on_selected(*selected);
+  } else if (const auto* jumped = std::get_if<ptp::ReferenceJumped>(&action)) {
+    log()(LogLevel::kWarning, "port 1 ({}): the reference jumped by {:.9f} s; starting anew",
+          options().interface, jumped->jump.seconds());
+  }
+}
+
+void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
+  set_scale(reference_scale(selected.transmitter.flags, selected.transmitter.announce.utc_offset));
+  follow_scale_change();
+  if (!selected.changed) return;
+  log()(LogLevel::kNotice, "selected best master clock {}",
+        to_text(selected.transmitter.announce.grandmaster).view());
+  if ((selected.transmitter.flags & ptp::flag::kPtpTimescale) == 0) {
+    log()(LogLevel::kNotice, "foreign master not using PTP timescale");
+  }
+  had_transmitter_ = true;
+}
+
+void PtpReceiver::housekeeping(FreeRunningTime now) {
+  node_.on_silence(now);
+  take_events(now);
+  record_.follow_lock(now);
+  if (real_clock() != nullptr) {
+    const ClockDiscipline& discipline = node_.discipline();
+    if (const auto wrong = real_clock()->attend(discipline.counters().commands > 0,
+                                                discipline.locked(), discipline.latest().servo)) {
+      return fail(*wrong);
+    }
+    follow_scale_change();
+  }
+  // Whoever runs for days must not wait for the end to learn this.
+  constexpr double kPatienceInAnnounces = 5.0;
+  if (!looked_for_missing_ &&
+      seconds_since_start() > kPatienceInAnnounces * std::exp2(options().log_announce_interval)) {
+    looked_for_missing_ = true;
+    if (log_missing(LogLevel::kWarning)) log_unusual(node_.port().counters());
+  }
+}
+
+// Before the next sample, which would be seconds off. The clock is never stepped for it.
+void PtpReceiver::follow_scale_change() {
+  if (real_clock() != nullptr && real_clock()->take_scale_change()) node_.on_new_reference();
+}
+
+bool PtpReceiver::log_missing(LogLevel level) {
+  if (!had_transmitter_) {
+    log()(level, "no time transmitter was found: domain {}, {}, transportSpecific {}",
+          options().domain, platform::name(options().socket.transport), options().major_sdo_id);
+  }
+  const bool no_peer = options().peer_to_peer() && !node_.port().peer_delay().mean_link_delay();
+  if (no_peer) {
+    log()(level, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
+  }
+  return !had_transmitter_ || no_peer;
+}
+
+int PtpReceiver::finish() {
+  record_.log_summary();
+  (void)log_missing(LogLevel::kNotice);
+  log_peer_delay(node_.port().peer_delay());
+  log_unusual(node_.port().counters());
+  return node_.locked() ? kSuccess : kNotLocked;
+}
+
+ptp::ManagedPort PtpReceiver::managed_port() {
+  return data_sets(options(), facts_, node_.port(), record_, now());
+}
+
+std::string PtpReceiver::status(const ptp::ManagementCounters& management) {
+  const StatusOfPort port{options(), facts_, seconds_since_start(), management};
+  return receiver_status(port, node_.port(), record_, now());
+}
+
+}  // namespace ftcs::daemon

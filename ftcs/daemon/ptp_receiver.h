@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+
+#include "ftcs/daemon/follower_record.h"
+#include "ftcs/daemon/ptp_port.h"
+#include "ftcs/node/receiver_node.h"
+
+namespace ftcs::daemon {
+
+/// A clock, virtual or real, that follows a PTP time transmitter: a node::ReceiverNode between
+/// sockets and log.
+class PtpReceiver final : public PtpPort, private Managed {
+ public:
+  PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+              std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
+              RealClock* real_clock);
+
+ private:
+  void start(FreeRunningTime now) override;
+  void on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
+                FreeRunningTime now) override;
+  void on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) override;
+  void on_sent(const ptp::EventId& id, std::optional<FreeRunningTime> sent,
+               FreeRunningTime now) override;
+  void on_timer(FreeRunningTime now) override;
+  void on_link_change(bool up, FreeRunningTime now) override;
+  [[nodiscard]] std::optional<FreeRunningTime> deadline() const override {
+    return node_.deadline();
+  }
+  void housekeeping(FreeRunningTime now) override;
+  [[nodiscard]] int finish() override;
+  [[nodiscard]] Managed* managed() override { return this; }
+  [[nodiscard]] ptp::ManagedPort managed_port() override;
+  [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
+
+  void take_events(FreeRunningTime now);
+  void take(const node::ReceiverEvent& event, FreeRunningTime now);
+  void tell(const ptp::Action& action);
+  void on_selected(const ptp::TransmitterSelected& selected);
+  void follow_scale_change();
+  /// True if there was something to say.
+  bool log_missing(LogLevel level);
+
+  StateKeeper state_;
+  node::ReceiverNode node_;
+  FollowerRecord record_;
+  bool had_transmitter_ = false;
+  bool looked_for_missing_ = false;
+  PortFacts facts_;
+};
+
+}  // namespace ftcs::daemon

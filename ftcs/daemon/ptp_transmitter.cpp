@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ptp_transmitter.h"
+
+#include <utility>
+
+#include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/status_report.h"
+
+namespace ftcs::daemon {
+namespace {
+
+ptp::TimeTransmitterConfig core_config(const PtpOptions& options,
+                                       const ptp::PortIdentity& identity) {
+  ptp::TimeTransmitterConfig config;
+  config.port = identity;
+  config.domain = options.domain;
+  config.major_sdo_id = options.major_sdo_id;
+  config.minor_version = options.minor_version;
+  config.log_announce_interval = options.log_announce_interval;
+  config.log_sync_interval = options.log_sync_interval;
+  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
+  config.priority1 = options.priority1;
+  config.priority2 = options.priority2;
+  config.quality = options.quality;
+  config.utc_offset = options.utc_offset;
+  config.time_source = options.time_source;
+  config.unicast = options.socket.unicast.has_value();
+  config.delay_mechanism = options.delay_mechanism;
+  config.peer_delay = options.peer_delay_config();
+  config.assume_two_step = options.assume_two_step;
+  config.follow_up_info = options.follow_up_info;
+  config.path_trace = options.path_trace;
+  return config;
+}
+
+}  // namespace
+
+PtpTransmitter::PtpTransmitter(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+                               std::unique_ptr<platform::TimestampClock> timestamps,
+                               const PortFacts& facts)
+    : PtpCorePort(kernel, options, log, std::move(timestamps),
+                  core_config(options, facts.identity)),
+      facts_(facts) {}
+
+int PtpTransmitter::finish() {
+  using ptp::Counter;
+  const ptp::Counters& counters = core().counters();
+  const bool transmitting = core().state() == ptp::PortState::kTimeTransmitter;
+  log()(LogLevel::kNotice, "summary: {}, {} Syncs sent, {} delay requests answered",
+        transmitting ? "transmitting" : "not transmitting", counters[Counter::kSyncSent],
+        counters[Counter::kDelayRespSent]);
+  log_peer_delay(core().peer_delay());
+  log_unusual(counters);
+  return transmitting ? kSuccess : kNotLocked;
+}
+
+ptp::ManagedPort PtpTransmitter::managed_port() { return data_sets(options(), facts_, core()); }
+
+std::string PtpTransmitter::status(const ptp::ManagementCounters& management) {
+  const StatusOfPort port{options(), facts_, seconds_since_start(), management};
+  return transmitter_status(port, core());
+}
+
+}  // namespace ftcs::daemon

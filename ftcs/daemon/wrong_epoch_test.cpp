@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+// World: a machine whose system clock is right, and a reference that shows another date: a
+// transmitter with stamps of either clock, or an adapter's clock that was never set.
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/phc/phc_runner.h"
+#include "ftcs/daemon/ptp_port.h"
+#include "ftcs/platform/fake_clocks.h"
+#include "ftcs/ptp/wire/codec.h"
+
+namespace ftcs::daemon {
+namespace {
+
+using platform::FakeClocks;
+
+constexpr double kSecond = 1e9;
+constexpr double k1970 = -static_cast<double>(FakeClocks::kEpoch) + 100 * kSecond;
+constexpr double kTai = 37 * kSecond;
+constexpr std::int64_t kBuilt = FakeClocks::kEpoch / 1'000'000'000 - 86'400;
+
+/// A kernel with a transmitter 10 us away at its network interface: Announce and one-step Sync once
+/// a second, and an answer to each Delay_Req.
+class NetworkKernel final : public FakeClocks {
+ public:
+  double reference_ahead = kTai;  ///< of ideal time
+  std::uint16_t flags = ptp::flag::kPtpTimescale | ptp::flag::kUtcOffsetValid;
+  std::function<void()> on_second;
+
+  int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override {
+    if (ideal_ns >= next_ns_) transmit();
+    int ready = 0;
+    for (pollfd& entry : descriptors) {
+      entry.revents = 0;
+      const auto socket = sockets.find(entry.fd);
+      if (socket == sockets.end()) continue;
+      if (!socket->second.received.empty()) entry.revents |= POLLIN;
+      if (!socket->second.error_queue.empty()) entry.revents |= POLLPRI;
+      ready += entry.revents != 0 ? 1 : 0;
+    }
+    return ready > 0 ? ready : FakeClocks::poll(descriptors, std::min(timeout_ms, 20));
+  }
+  ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
+                  const platform::SocketAddress&) noexcept override {
+    const auto message = ptp::decode(bytes);
+    if (message && std::holds_alternative<ptp::DelayReq>(message->body)) {
+      queue_tx_stamp(fd, bytes, stamp(system), stamp(phc));
+      run(kPath);
+      ptp::Message answer = about(message->header.sequence_id);
+      answer.body = ptp::DelayResp{reference(), message->header.source};
+      deliver(320, answer);
+    }
+    return static_cast<ssize_t>(bytes.size());
+  }
+
+ private:
+  static constexpr double kPath = 10'000.0;
+  static std::int64_t stamp(const Clock& clock) { return kEpoch + std::llround(clock.time_ns); }
+  [[nodiscard]] ReferenceTime reference() const {
+    return ReferenceTime::from_ns(kEpoch + std::llround(ideal_ns + reference_ahead));
+  }
+  static ptp::Message about(std::uint16_t sequence) {
+    ptp::Message message;
+    message.header.source = {ptp::ClockIdentity{{1, 2, 3, 4, 5, 6, 7, 8}}, 1};
+    message.header.sequence_id = sequence;
+    message.header.log_interval = 0;
+    return message;
+  }
+  void transmit() {
+    next_ns_ = ideal_ns + kSecond;
+    if (on_second) on_second();
+    ptp::Message announce = about(sequence_);
+    announce.header.flags = flags;
+    ptp::Announce body;
+    body.utc_offset = 37;
+    body.grandmaster = announce.header.source.clock;
+    announce.body = body;
+    deliver(320, announce);
+    ptp::Message sync = about(sequence_++);
+    sync.body = ptp::Sync{reference()};
+    run(kPath);
+    deliver(319, sync);
+  }
+  void deliver(std::uint16_t port, const ptp::Message& message) {
+    const auto bytes = ptp::encode(message);
+    const auto view = bytes->view();
+    for (auto& [fd, socket] : sockets) {
+      if (socket.port != port) continue;
+      socket.received.push_back({{view.begin(), view.end()}, stamp(system), stamp(phc)});
+    }
+  }
+
+  double next_ns_ = 0.0;
+  std::uint16_t sequence_ = 0;
+};
+
+class WrongEpoch : public testing::Test {
+ protected:
+  WrongEpoch() {
+    kernel.phc_index = 0;
+    kernel.timestamping |=
+        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    kernel.phc.time_ns = kTai;
+    ptp.interface = ptp.socket.interface = "eth0";
+    ptp.uds_address.clear();
+    ptp.duration = phc.duration = Duration::from_ns(30 * kSecond);
+    ptp.log_level = 5;
+    ptp.epoch.earliest_utc_s = phc.epoch.earliest_utc_s = kBuilt;
+    phc.source = "/dev/ptp0";
+    phc.sink_ahead_s = -37;
+  }
+  void choose(ClockKind clock) {
+    ptp.clock = clock;
+    ptp.timestamps = clock == ClockKind::kSystem ? platform::TimestampMode::kSoftware
+                                                 : platform::TimestampMode::kHardware;
+  }
+  int follow_network() {
+    return captured([&] { return run_ptp(kernel, ptp); });
+  }
+  int follow_clock() {
+    return captured([&] { return run_phc(kernel, phc, log); });
+  }
+  template <class Run>
+  int captured(Run run) {
+    const double start = kernel.ideal_ns;
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = run();
+    (void)testing::internal::GetCapturedStdout();
+    errors = testing::internal::GetCapturedStderr();
+    kernel.held_names.clear();
+    lasted_s = (kernel.ideal_ns - start) / kSecond;
+    return code;
+  }
+  void expect_refused(int code, const char* reason) {
+    EXPECT_EQ(code, kRuntimeError);
+    EXPECT_EQ(kernel.commands, 0) << "no clock was touched";
+    EXPECT_LT(lasted_s, 16.0);
+    EXPECT_NE(errors.find(reason), std::string::npos) << errors;
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
+  }
+
+  NetworkKernel kernel;
+  Log log{kernel, stdout, 5};
+  PtpOptions ptp;
+  PhcOptions phc;
+  std::string errors;
+  double lasted_s = 0.0;
+};
+
+TEST_F(WrongEpoch, a_transmitter_at_1970_moves_neither_clock) {
+  for (const ClockKind clock : {ClockKind::kSystem, ClockKind::kPhc}) {
+    for (const ServoKind servo : {ServoKind::kAdaptive, ServoKind::kLinuxptpPi}) {
+      choose(clock);
+      ptp.servo.kind = servo;
+      ptp.first_step = servo == ServoKind::kAdaptive;
+      kernel.reference_ahead = k1970;
+      expect_refused(follow_network(), "the reference shows 1970-01-01");
+    }
+  }
+}
+
+TEST_F(WrongEpoch, a_transmitter_of_an_arbitrary_timescale_moves_neither_clock) {
+  for (const ClockKind clock : {ClockKind::kSystem, ClockKind::kPhc}) {
+    choose(clock);
+    kernel.flags = 0;
+    expect_refused(follow_network(), "arbitrary timescale");
+  }
+}
+
+TEST_F(WrongEpoch, an_adapters_clock_that_was_never_set_moves_neither_clock) {
+  for (const char* sink : {"CLOCK_REALTIME", "/dev/ptp1"}) {
+    kernel.phc.time_ns = k1970;
+    phc.sink = sink;
+    phc.sink_ahead_s = sink == std::string("/dev/ptp1") ? 0 : -37;
+    expect_refused(follow_clock(), "the reference shows 1970-01-01");
+  }
+}
+
+TEST_F(WrongEpoch, a_system_clock_that_was_never_set_moves_no_adapters_clock) {
+  kernel.system.time_ns = k1970;
+  phc.source = "CLOCK_REALTIME";
+  phc.sink = "/dev/ptp0";
+  expect_refused(follow_clock(), "the reference shows 1970-01-01");
+}
+
+TEST_F(WrongEpoch, a_date_two_days_away_moves_no_clock) {
+  constexpr double kTwoDays = 2 * 86'400 * kSecond;
+  choose(ClockKind::kSystem);
+  ptp.first_step = true;
+  kernel.reference_ahead = kTai + kTwoDays;
+  expect_refused(follow_network(), "from the system clock");
+  kernel.phc.time_ns = kTai + kTwoDays;
+  expect_refused(follow_clock(), "from the system clock");
+}
+
+TEST_F(WrongEpoch, what_was_asked_for_is_followed) {
+  choose(ClockKind::kPhc);
+  ptp.epoch.any_epoch = true;
+  ptp.first_step = true;
+  kernel.flags = 0;
+  kernel.reference_ahead = k1970;
+  EXPECT_EQ(follow_network(), kSuccess) << errors;
+  EXPECT_NEAR(kernel.phc.time_ns - kernel.ideal_ns, k1970, 1e5);
+}
+
+TEST_F(WrongEpoch, a_plausible_reference_is_followed) {
+  for (const ClockKind clock : {ClockKind::kSystem, ClockKind::kPhc}) {
+    choose(clock);
+    EXPECT_EQ(follow_network(), kSuccess) << errors;
+    EXPECT_NEAR(kernel.phc.time_ns - kernel.ideal_ns, kTai, 1'000.0);
+    EXPECT_NEAR(kernel.system.time_ns - kernel.ideal_ns, 0.0, 1'000.0);
+  }
+  EXPECT_EQ(follow_clock(), kSuccess) << errors;
+}
+
+// A board without a battery: its clock starts in 1970, and the reference is there to set it.
+TEST_F(WrongEpoch, a_system_clock_that_starts_in_1970_is_set) {
+  choose(ClockKind::kSystem);
+  ptp.first_step = true;
+  kernel.system.time_ns = k1970;
+  EXPECT_EQ(follow_network(), kSuccess) << errors;
+  EXPECT_NEAR(kernel.system.time_ns - kernel.ideal_ns, 0.0, 1'000.0);
+}
+
+// The grandmaster loses its mind, or another one takes over.
+TEST_F(WrongEpoch, a_wrong_date_in_mid_run_is_not_followed_and_left_when_it_is_gone) {
+  for (const bool to_system : {true, false}) {
+    choose(to_system ? ClockKind::kSystem : ClockKind::kPhc);
+    ptp.servo.kind = ServoKind::kLinuxptpPi;
+    ptp.step_threshold = Nanoseconds{1'000};  // even if it may step at any time
+    ptp.duration = Duration::from_ns(60 * kSecond);
+    const double start = kernel.ideal_ns;
+    double largest = 0.0;
+    kernel.on_second = [&] {
+      const double s = (kernel.ideal_ns - start) / kSecond;
+      kernel.reference_ahead = s > 20.0 && s < 30.0 ? k1970 : kTai;
+      const FakeClocks::Clock& clock = to_system ? kernel.system : kernel.phc;
+      const double error = clock.time_ns - kernel.ideal_ns - (to_system ? 0.0 : kTai);
+      if (s > 15.0) largest = std::max(largest, std::abs(error));
+    };
+    EXPECT_EQ(follow_network(), kSuccess) << errors;
+    EXPECT_LT(largest, 2'000.0);
+  }
+}
+
+// What it was asleep for is no jump of the reference.
+TEST_F(WrongEpoch, a_machine_that_slept_follows_again) {
+  bool slept = false;
+  constexpr std::int64_t kHour = 3'600'000'000'000;
+  kernel.on_poll = [&] {
+    if (slept || kernel.ideal_ns < 10 * kSecond) return;
+    slept = true;
+    kernel.slept_ns = kHour;
+    kernel.ideal_ns += static_cast<double>(kHour);
+    kernel.phc.time_ns += static_cast<double>(kHour);
+    kernel.system.time_ns += static_cast<double>(kHour) + 0.2 * kSecond;  // by a coarse RTC
+  };
+  phc.duration = Duration::from_ns(120 * kSecond);
+  EXPECT_EQ(follow_clock(), kSuccess) << errors;
+  EXPECT_TRUE(slept);
+  EXPECT_NEAR(kernel.system.time_ns - kernel.ideal_ns, 0.0, 1'000.0);
+}
+
+}  // namespace
+}  // namespace ftcs::daemon
