@@ -3,6 +3,7 @@
 // limits as settings of a configuration file.
 #include "apps/ftcs/steering_arguments.h"
 
+#include <CLI/CLI.hpp>
 #include <gtest/gtest.h>
 
 #include "apps/ftcs/config_file.h"
