@@ -3,6 +3,7 @@
 # make test       install what is missing, build, test (at most 5 minutes after the build)
 # make test-all   everything, long runs too
 # make test-vm    real clocks of a real kernel in a virtual machine: docs/vm.md (at most 10 minutes); JOB=busy: one job of it
+# make test-embedded  the core and the integer servo for Cortex-M, run in QEMU and compared with x86
 # make bench      nanoseconds and instructions per update, allocations
 # make check      formatting, spelling, layers; make check-tidy: clang-tidy too
 # make fuzz       each fuzz target for FUZZ_SECONDS
@@ -16,7 +17,7 @@ JOB ?=
 VM_LABEL ?= vm
 VM_FLAGS ?=
 
-.PHONY: all configure build demo test test-all test-vm bench check check-tidy fuzz mutate deps deps-test clean
+.PHONY: all configure build demo test test-all test-embedded test-vm bench check check-tidy fuzz mutate deps deps-test clean
 
 all: build
 
@@ -51,6 +52,9 @@ else
 	@test/vm/run $(VM_FLAGS) $(JOB)
 endif
 
+test-embedded: deps
+	@test/embedded/run.sh
+
 bench: deps-test
 	@cmake --preset release > /dev/null
 	@cmake --build build-release -j $(JOBS)
@@ -72,4 +76,4 @@ mutate: deps-test
 	@tools/mutate.py
 
 clean:
-	@cmake -E rm -rf build build-release build-clang build-asan-ubsan build-tsan build-tidy build-fuzz
+	@cmake -E rm -rf build build-release build-clang build-asan-ubsan build-tsan build-tidy build-fuzz build-embedded

@@ -11,8 +11,10 @@ function(ftcs_cycle_library name)
   target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:ftcs_warnings> $<BUILD_INTERFACE:ftcs_realtime>)
-  # LinuxCNC's drivers are shared objects.
-  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  # LinuxCNC's drivers are shared objects. A microcontroller's image has no table of offsets to fill in.
+  if(NOT FTCS_CORE_ONLY)
+    set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
   # A sanitizer's run-time library is what a C program would have to do without.
   target_compile_options(${name} PRIVATE -fno-threadsafe-statics -fno-sanitize=all)
 endfunction()

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT */
+/* Vector table, start, semihosting (Arm's "Semihosting for AArch32 and AArch64", 2.0) and a count
+ * of instructions for a Cortex-M in QEMU. */
+#include <stddef.h>
+
+#include "board.h"
+
+extern uint32_t stack_top, data_load, data_start, data_end, bss_start, bss_end;
+typedef void (*function)(void);
+extern const function init_array_start[], init_array_end[];
+
+int main(void);
+void reset(void);
+
+enum { SYS_WRITE0 = 0x04, SYS_EXIT_EXTENDED = 0x20, APPLICATION_EXIT = 0x20026 };
+
+static void semihost(uint32_t operation, const void* argument) {
+  register uint32_t r0 __asm("r0") = operation;
+  register const void* r1 __asm("r1") = argument;
+  __asm volatile("bkpt 0xAB" : "+r"(r0) : "r"(r1) : "memory");
+}
+
+void board_write(const char* text) { semihost(SYS_WRITE0, text); }
+
+static void leave(uint32_t code) {
+  const uint32_t block[2] = {APPLICATION_EXIT, code};
+  semihost(SYS_EXIT_EXTENDED, block);
+  for (;;) {
+  }
+}
+
+static void fault(void) {
+  board_write("fault\n");
+  leave(3);
+}
+
+void reset(void) {
+  uint32_t* to;
+  const uint32_t* from = &data_load;
+  const function* constructor;
+#if defined(__ARM_FP)
+  *(volatile uint32_t*)0xE000ED88U |= 0xFU << 20; /* CPACR: the floating point unit may be used */
+  __asm volatile("dsb\n isb");
+#endif
+  for (to = &data_start; to < &data_end; ++to) *to = *from++;
+  for (to = &bss_start; to < &bss_end; ++to) *to = 0;
+  for (constructor = init_array_start; constructor < init_array_end; ++constructor)
+    (*constructor)();
+  leave((uint32_t)main());
+}
+
+__attribute__((section(".vectors"), used)) static const void* const vectors[16] = {
+    &stack_top,         (const void*)reset, (const void*)fault, (const void*)fault,
+    (const void*)fault, (const void*)fault, (const void*)fault};
+
+/* With QEMU's -icount shift=8 an instruction takes 256 ns of the machine's time, and SysTick counts
+ * its 25 MHz: 6.4 ticks an instruction. What reading it costs is subtracted. */
+#define SYSTICK ((volatile uint32_t*)0xE000E010U)
+
+static uint32_t began;
+
+static uint32_t ticks(void) { return 0xFFFFFFU - SYSTICK[2]; }
+
+void board_count_start(void) {
+  SYSTICK[1] = 0xFFFFFFU;
+  SYSTICK[0] = 5;
+  began = ticks();
+}
+
+uint32_t board_count(void) {
+  static uint32_t overhead;
+  const uint32_t now = ticks();
+  if (overhead == 0U) {
+    const uint32_t before = ticks();
+    overhead = ((ticks() - before) & 0xFFFFFFU) + 1U;
+  }
+  {
+    const uint32_t elapsed = (now - began) & 0xFFFFFFU;
+    return elapsed < overhead ? 0U : (elapsed - overhead) * 5U / 32U;
+  }
+}

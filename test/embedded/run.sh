@@ -1,0 +1,114 @@
+#!/bin/bash
+# make test-embedded: compiles the core and ftcs_addend for Cortex-M4F, M7 and M0+, runs programs of both under
+# qemu-system-arm and compares what they print with x86's, bit for bit. Sizes and instructions of ftcs_addend are printed and
+# held to limits. Without the cross compiler or QEMU (root or sudo installs them on Debian) it is skipped, with the reason.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+here=test/embedded
+out=build-embedded
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+
+tools/install-deps embedded || true
+for tool in arm-none-eabi-g++ qemu-system-arm cmake ninja; do
+  command -v "$tool" > /dev/null || { echo "test-embedded: skipped, $tool is not installed"; exit 0; }
+done
+
+declare -A flags=([m4f]="-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard" [m7]="-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"
+  [m0plus]="-mcpu=cortex-m0plus -mfloat-abi=soft")
+declare -A board=([m4f]=mps2-an386 [m7]=mps2-an500 [m0plus]=mps2-an385)
+# Limits: bytes of everything, of FTCS alone (init and update), mean instructions of an FTCS update.
+declare -A limit_all=([m4f]=5248 [m7]=5248 [m0plus]=6016) limit_ftcs=([m4f]=3456 [m7]=3456 [m0plus]=4096)
+declare -A limit_count=([m4f]=1300 [m7]=1300 [m0plus]=3350)
+common=(-mthumb -Os -ffunction-sections -fdata-sections -ffp-contract=off -I. -Iembedded -I"$here/board")
+link=(-nostartfiles --specs=nano.specs -Wl,--gc-sections -T "$here/board/mps2.ld")
+startup=("$here/board/startup.c" "$here/board/line.c")
+
+emulate() {  # machine, image; -icount: an instruction takes 256 ns
+  timeout 570 qemu-system-arm -M "$1" -nographic -monitor none -serial none -semihosting-config enable=on,target=native \
+    -icount shift=8,sleep=off -kernel "$2" < /dev/null 2>&1
+}
+same() {  # what, ours, theirs
+  if diff <(grep -v '^#' "$2") <(grep -v '^#' "$3") > "$out/diff"; then
+    echo "  $1: the same bits as x86"
+  else
+    fail "$1 differs from x86:"
+    cat "$out/diff"
+  fi
+}
+bytes() { "$1-size" -t "$2" | awk 'END {print $1}'; }
+
+mkdir -p "$out/x86"
+echo "== x86"
+host=(-O2 -ffp-contract=off -I. -Iembedded -I"$here/board")
+gcc "${host[@]}" -std=c99 -DSAMPLES=1000000 "$here"/{addend_run,board/line,board/host}.c embedded/ftcs_addend.c -o "$out/x86/addend_long"
+gcc "${host[@]}" -std=c99 "$here"/{addend_run,board/line,board/host}.c embedded/ftcs_addend.c -o "$out/x86/addend"
+cmake -S . -B "$out/x86/core" -G Ninja -DFTCS_CORE_ONLY=ON -DCMAKE_BUILD_TYPE=Release > "$out/x86/configure.log"
+cmake --build "$out/x86/core" > "$out/x86/build.log" || { tail -20 "$out/x86/build.log"; exit 1; }
+libraries=(layer/discipline/libftcs_cycle_servo.a layer/servo/libftcs_servo.a layer/measurement/libftcs_measurement.a
+  layer/estimation/libftcs_estimation.a layer/clock/libftcs_clock.a)
+archives() {
+  for library in "${libraries[@]}"; do if [ -e "$1/$library" ]; then echo "$1/$library"; fi; done
+}
+gcc "${host[@]}" -std=c99 -c "$here/board/line.c" -o "$out/x86/line.o"
+gcc "${host[@]}" -std=c99 -c "$here/board/host.c" -o "$out/x86/host.o"
+# shellcheck disable=SC2046
+g++ "${host[@]}" -std=c++20 "$here/core_run.cpp" "$out"/x86/{line,host}.o $(archives "$out/x86/core") -o "$out/x86/core_run"
+for program in addend_long addend core_run; do "$out/x86/$program" > "$out/x86/$program.txt"; done
+
+for cpu in m4f m7 m0plus; do
+  echo "== Cortex-$cpu"
+  mkdir -p "$out/$cpu"
+  read -ra target <<< "${flags[$cpu]}"
+  cmake -S . -B "$out/$cpu/core" -G Ninja --toolchain cmake/toolchains/arm-none-eabi.cmake -DFTCS_CPU=$cpu -DFTCS_CORE_ONLY=ON \
+    -DCMAKE_BUILD_TYPE=MinSizeRel > "$out/$cpu/configure.log" 2>&1
+  cmake --build "$out/$cpu/core" > "$out/$cpu/build.log" || { fail "the core for $cpu"; grep -E 'error' "$out/$cpu/build.log"; continue; }
+  echo "  the core compiles: $(find "$out/$cpu/core" -name '*.obj' | wc -l) objects, warnings as errors"
+
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror \
+    -c embedded/ftcs_addend.c -o "$out/$cpu/ftcs_addend.o"
+  if arm-none-eabi-nm -u "$out/$cpu/ftcs_addend.o" | grep -E '__aeabi_(d|f|i2|ui2|l2|ul2)|malloc|_sbrk'; then
+    fail "ftcs_addend for $cpu reaches for floating point or a heap"
+  fi
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror \
+    -c examples/embedded/stm32_ptp_clock.c -o "$out/$cpu/stm32.o"
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 "${startup[@]}" "$here/addend_run.c" embedded/ftcs_addend.c "${link[@]}" \
+    -o "$out/$cpu/addend.elf"
+  emulate "${board[$cpu]}" "$out/$cpu/addend.elf" > "$out/$cpu/addend.txt"
+  same "ftcs_addend" "$out/$cpu/addend.txt" "$out/x86/addend.txt"
+
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -DFTCS_ADDEND_WITHOUT_QUIET -DALONE "$here/footprint.c" \
+    embedded/ftcs_addend.c "${startup[@]}" "${link[@]}" -o "$out/$cpu/alone.elf"
+  all=$(bytes arm-none-eabi "$out/$cpu/ftcs_addend.o")
+  alone=$("$here/own_bytes.sh" "$out/$cpu/alone.elf" "$out/$cpu/ftcs_addend.o")
+  count=$(sed -n 's/^# instructions of an update, ftcs: mean \([0-9]*\).*/\1/p' "$out/$cpu/addend.txt")
+  echo "  ftcs_addend: $all bytes with everything, $alone bytes for init and update without quiet mode; FTCS update $count instructions"
+  grep '^#' "$out/$cpu/addend.txt" | sed 's/^#/ /'
+  [ "$all" -le "${limit_all[$cpu]}" ] || fail "$cpu: $all bytes, at most ${limit_all[$cpu]}"
+  [ "$alone" -le "${limit_ftcs[$cpu]}" ] || fail "$cpu: FTCS alone $alone bytes, at most ${limit_ftcs[$cpu]}"
+  [ "$count" -le "${limit_count[$cpu]}" ] || fail "$cpu: $count instructions, at most ${limit_count[$cpu]}"
+
+  for part in startup line; do
+    arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 -c "$here/board/$part.c" -o "$out/$cpu/$part.o"
+  done
+  # shellcheck disable=SC2046
+  arm-none-eabi-g++ "${target[@]}" "${common[@]}" -std=c++20 -fno-exceptions -fno-rtti -fno-threadsafe-statics "$here/core_run.cpp" \
+    "$out/$cpu"/{startup,line}.o $(archives "$out/$cpu/core") "${link[@]}" -o "$out/$cpu/core_run.elf"
+  heap=$(arm-none-eabi-nm "$out/$cpu/core_run.elf" | awk '$3 ~ /^(malloc|_malloc_r|_sbrk|abort|_exit)$/ {print $3}')
+  [ -z "$heap" ] || fail "core_run for $cpu links" $heap
+  emulate "${board[$cpu]}" "$out/$cpu/core_run.elf" > "$out/$cpu/core_run.txt"
+  same "servos of the core" "$out/$cpu/core_run.txt" "$out/x86/core_run.txt"
+done
+
+echo "== ftcs_addend, 10^6 random samples, Cortex-M0+ against x86"
+read -ra target <<< "${flags[m0plus]}"
+arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 -DSAMPLES=1000000 "${startup[@]}" "$here/addend_run.c" \
+  embedded/ftcs_addend.c "${link[@]}" -o "$out/m0plus/addend_long.elf"
+emulate mps2-an385 "$out/m0plus/addend_long.elf" > "$out/m0plus/addend_long.txt"
+same "10^6 samples" "$out/m0plus/addend_long.txt" "$out/x86/addend_long.txt"
+
+echo "== proofs"
+"$here/prove.sh" || fail "a proof"
+
+[ "$failures" -eq 0 ] || { echo "test-embedded: $failures failures"; exit 1; }
+echo "test-embedded: passed (QEMU, not silicon)"
