@@ -2,6 +2,7 @@
 #include "ftcs/discipline/clock_discipline.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ftcs {
 namespace {
@@ -24,6 +25,12 @@ ServoConfig limited(const DisciplineConfig& config, const RateLimits& limits) no
   return servo;
 }
 
+bool has_fixed_delay(const ServoConfig& servo) noexcept {
+  return servo.two_way.fixed_path_delay ||
+         (servo.kind == ServoKind::kAdaptive && servo.adaptive.fixed_path_delay) ||
+         (servo.kind == ServoKind::kKalman && servo.kalman.fixed_path_delay);
+}
+
 }  // namespace
 
 ClockDiscipline::ClockDiscipline(const DisciplineConfig& config, AdjustableClock& clock) noexcept
@@ -33,6 +40,7 @@ ClockDiscipline::ClockDiscipline(const DisciplineConfig& config, AdjustableClock
       servo_(make_servo(limited(config, limits_))),
       lock_(config.lock),
       rate_change_(config.largest_rate_change),
+      path_delay_is_fixed_(has_fixed_delay(config.servo)),
       sync_interval_(config.servo.sync_interval) {}
 
 std::optional<ClockError> ClockDiscipline::start_at(Rate rate) noexcept {
@@ -54,8 +62,9 @@ Telemetry ClockDiscipline::on_pair(const EventPair& event, bool paces) noexcept 
   const ServoUpdate update = servo_.update(pair, now);
   telemetry_.direction = event.direction;
   telemetry_.verdict = update.verdict;
-  telemetry_.servo = servo_.snapshot();
   const bool used = update.verdict == SampleVerdict::kUsed;
+  if (used && event.direction == Direction::kBackward) path_delay_measured_ = true;
+  telemetry_.servo = known(servo_.snapshot());
   if (used && !paces) {
     ++counters_.beside;
   } else {
@@ -73,7 +82,7 @@ Telemetry ClockDiscipline::on_pair(const EventPair& event, bool paces) noexcept 
 Telemetry ClockDiscipline::on_silence() noexcept {
   const ClockReading now = clock_.read();
   begin(now);
-  if (telemetry_.servo.offset_known) telemetry_.servo = servo_.snapshot_at(now);
+  if (telemetry_.servo.offset_known) telemetry_.servo = known(servo_.snapshot_at(now));
   check_silence(now);
   // What is silence is decided here: the servo knows only the gaps that it saw.
   if (!in_holdover_ && telemetry_.servo.state == ServoState::kHoldover) {
@@ -89,14 +98,44 @@ void ClockDiscipline::on_new_reference() noexcept {
   last_gap_ = Duration{};
   announced_interval_ = Duration{};
   in_holdover_ = false;
+  path_delay_measured_ = false;
   ++counters_.new_references;
-  telemetry_.servo = servo_.snapshot();
+  telemetry_.servo = known(servo_.snapshot());
   finish();
 }
 
 void ClockDiscipline::on_new_timescale() noexcept {
   first_command_ = true;
   on_new_reference();
+}
+
+JumpPlan ClockDiscipline::on_reference_jump(Duration jump) noexcept {
+  const Nanoseconds largest = config_.largest_first_offset;
+  const bool is_beginning = largest > Nanoseconds{0} && abs(jump) > Duration{largest};
+  if (is_beginning) {
+    on_new_timescale();
+  } else {
+    on_new_reference();
+  }
+  const bool may_step = config_.step.permits(first_command_);
+  if (may_step && abs(jump) > Duration{config_.step.threshold}) return {JumpResponse::kStepped, {}};
+  if (is_beginning) return {JumpResponse::kRefused, {}};
+  return {JumpResponse::kSlewed, slew_time(jump)};
+}
+
+Duration ClockDiscipline::slew_time(Duration jump) const noexcept {
+  const double limit = (jump < Duration{} ? limits_.slowest : limits_.fastest).ratio();
+  double speed = std::abs(limit / telemetry_.tracking_rate.ratio() - 1.0);
+  if (config_.largest_rate_change > 0.0) speed = std::min(speed, config_.largest_rate_change);
+  return Duration::from_ns(std::abs(jump.ns()) / speed);
+}
+
+// What a path delay that nobody knows leaves of the offset is no small deviation.
+ServoSnapshot ClockDiscipline::known(ServoSnapshot snapshot) const noexcept {
+  if (path_delay_known()) return snapshot;
+  snapshot.offset_sigma_ns = ServoSnapshot::kUnknown;
+  snapshot.path_delay_sigma_ns = ServoSnapshot::kUnknown;
+  return snapshot;
 }
 
 void ClockDiscipline::begin(const ClockReading& reading) noexcept {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/discipline/jump_plan.h"
 #include "ftcs/discipline/lock_detector.h"
 #include "ftcs/discipline/rate_change_limit.h"
 #include "ftcs/discipline/step_policy.h"
@@ -58,10 +59,20 @@ class ClockDiscipline {
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:
   /// step policy and largest_first_offset are asked again as with the first offset.
   void on_new_timescale() noexcept;
+  /// The same reference has jumped; positive: ahead. A new reference, and beyond
+  /// largest_first_offset a beginning, as on_new_timescale(). Tells what will happen.
+  JumpPlan on_reference_jump(Duration jump) noexcept;
 
   [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
   [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }
-  [[nodiscard]] bool locked() const noexcept { return lock_.locked() && !in_holdover_; }
+  /// Never without a path delay: what it hides from the offset may be any length.
+  [[nodiscard]] bool locked() const noexcept {
+    return lock_.locked() && !in_holdover_ && path_delay_known();
+  }
+  /// It is configured, or this reference has answered.
+  [[nodiscard]] bool path_delay_known() const noexcept {
+    return path_delay_is_fixed_ || path_delay_measured_;
+  }
 
  private:
   void begin(const ClockReading& reading) noexcept;
@@ -74,6 +85,8 @@ class ClockDiscipline {
   [[nodiscard]] bool at_limit(const ServoCommand& command) const noexcept;
   [[nodiscard]] bool refuses(Duration offset) const noexcept;
   const Telemetry& finish() noexcept;
+  [[nodiscard]] ServoSnapshot known(ServoSnapshot snapshot) const noexcept;
+  [[nodiscard]] Duration slew_time(Duration jump) const noexcept;
 
   DisciplineConfig config_;
   AdjustableClock& clock_;
@@ -81,6 +94,8 @@ class ClockDiscipline {
   AnyServo servo_;
   LockDetector lock_;
   RateChangeLimit rate_change_;
+  bool path_delay_is_fixed_;
+  bool path_delay_measured_ = false;
   bool first_command_ = true;
   bool in_holdover_ = false;
   bool has_sample_ = false;

@@ -5,6 +5,7 @@
 // unless a test says otherwise.
 #include "ftcs/discipline/clock_discipline.h"
 
+#include <cmath>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -413,6 +414,69 @@ TEST_F(ClockDisciplineTest, an_unknown_path_delay_is_no_offset_and_no_lock) {
     EXPECT_FALSE(telemetry.servo.offset_known);
     EXPECT_FALSE(telemetry.commanded);
     EXPECT_FALSE(telemetry.locked);
+  }
+}
+
+// Syncs alone say how fast the clock is, and what it is off by but for the length of the path.
+TEST_F(ClockDisciplineTest, without_a_measured_path_delay_it_steers_but_is_not_locked_nor_sure) {
+  DisciplineConfig config = config_for(ServoKind::kAdaptive);
+  config.servo.two_way.fixed_path_delay.reset();
+  start(Nanoseconds{5us}, config);
+  Telemetry telemetry;
+  for (int n = 0; n < 40; ++n) telemetry = sync_and_wait();
+  EXPECT_GT(discipline_->counters().commands, 30U);
+  EXPECT_FALSE(telemetry.locked);
+  EXPECT_FALSE(discipline_->path_delay_known());
+  EXPECT_TRUE(std::isnan(telemetry.servo.offset_sigma_ns));
+  EXPECT_TRUE(std::isnan(discipline_->on_silence().servo.offset_sigma_ns));
+  const auto answered = [&] {
+    return discipline_->on_pair({Direction::kBackward, reference(), oscillator_.now()});
+  };
+  telemetry = answered();
+  EXPECT_EQ(telemetry.verdict, SampleVerdict::kUsed);
+  EXPECT_TRUE(discipline_->locked()) << "the first answer is what was missing";
+  EXPECT_TRUE(std::isfinite(telemetry.servo.offset_sigma_ns));
+  discipline_->on_new_reference();
+  for (int n = 0; n < 40; ++n) telemetry = sync_and_wait();
+  EXPECT_FALSE(telemetry.locked) << "another reference has another path";
+}
+
+TEST_F(ClockDisciplineTest, a_jump_of_the_reference_beyond_the_bound_is_a_beginning) {
+  for (const bool may_step : {false, true}) {
+    DisciplineConfig config = config_for(ServoKind::kFtcs);
+    config.largest_first_offset = 1s;
+    config.step.mode = may_step ? StepMode::kFirst : StepMode::kNever;
+    reference_jump_ = Duration{};
+    start(Nanoseconds{10us}, config);
+    for (int n = 0; n < 8; ++n) sync_and_wait();
+    reference_jump_ = Nanoseconds{2s};
+    const JumpPlan plan = discipline_->on_reference_jump(reference_jump_);
+    sync_and_wait();
+    const Telemetry telemetry = sync_and_wait();
+    EXPECT_EQ(plan.response, may_step ? JumpResponse::kStepped : JumpResponse::kRefused);
+    EXPECT_EQ(telemetry.offset_refused, !may_step);
+    EXPECT_EQ(telemetry.step != Duration{}, may_step);
+  }
+}
+
+TEST_F(ClockDisciplineTest, a_smaller_jump_is_slewed_and_the_time_that_takes_is_told) {
+  DisciplineConfig config = config_for(ServoKind::kAdaptive);
+  config.largest_first_offset = 1s;
+  config.step.mode = StepMode::kFirst;
+  config.servo.limits = RateLimits::symmetric_ppb(1e6);
+  for (const Duration jump : {Duration{Nanoseconds{5ms}}, -Duration{Nanoseconds{5ms}}}) {
+    reference_jump_ = Duration{};
+    start(Nanoseconds{0}, config);
+    for (int n = 0; n < 40; ++n) sync_and_wait();
+    reference_jump_ = jump;
+    const JumpPlan plan = discipline_->on_reference_jump(jump);
+    EXPECT_EQ(plan.response, JumpResponse::kSlewed);
+    EXPECT_NEAR(plan.slew.seconds(), 5.0, 0.1);
+    const std::uint64_t steps = discipline_->counters().steps;
+    double taken = 0.0;
+    for (; std::abs(offset_ns()) > 100.0 && taken < 20.0; taken += 0.125) sync_and_wait();
+    EXPECT_NEAR(taken, plan.slew.seconds(), 1.0);
+    EXPECT_EQ(discipline_->counters().steps, steps);
   }
 }
 
