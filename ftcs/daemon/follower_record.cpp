@@ -54,6 +54,20 @@ std::string holdover_text(const node::Note& note) {
                                  : fmt::format("{} Syncs refused, no good one", note.refused_syncs);
 }
 
+std::string plan_text(const JumpPlan& plan) {
+  switch (plan.response) {
+    case JumpResponse::kSlewed:
+      return fmt::format("starting anew; slewing the clock there takes {:.1f} s",
+                         plan.slew.seconds());
+    case JumpResponse::kStepped:
+      return "starting anew; the clock is stepped there";
+    case JumpResponse::kRefused:
+      break;
+  }
+  return fmt::format("more than {} s is refused as a first offset is (--first-step allows a step)",
+                     kLargestFirstOffset.count() / 1e9);
+}
+
 std::string foreign_text(const node::Note& note) {
   return fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
                      note.difference_ns);
@@ -154,6 +168,10 @@ std::optional<std::string> FollowerRecord::add(const node::Note& note) {
     case NoteKind::kHoldover:
       log_(LogLevel::kWarning, "{}: {} for a while; keeping the last rate (holdover)", label_,
            holdover_text(note));
+      break;
+    case NoteKind::kReferenceJumped:
+      log_(LogLevel::kWarning, "{}: the reference jumped by {:+.9f} s: {}", label_,
+           note.jump.seconds(), plan_text(note.plan));
       break;
     case NoteKind::kFirstOffsetRefused:
       return fmt::format(

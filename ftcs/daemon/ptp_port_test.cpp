@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/fake_network.h"
 #include "ftcs/platform/fake_clocks.h"
 
 namespace ftcs::daemon {
@@ -32,6 +33,67 @@ TEST(PtpPort, missing_transmit_stamps_are_said_once_and_counted) {
   EXPECT_GT(kernel.sent.size(), 15U);
   EXPECT_EQ(occurrences(said, "no transmit timestamp within 10 ms"), 1U) << said;
   EXPECT_NE(said.find("missing_transmit_stamp 1"), std::string::npos) << "15 and more: " << said;
+}
+
+/// A receiver with a virtual clock and a transmitter 10 us away.
+struct Link {
+  Link() {
+    options.interface = options.socket.interface = "eth0";
+    options.timestamps = platform::TimestampMode::kSoftware;
+    options.initial_offset = Duration::from_ns(kTai);
+    options.duration = Duration::from_ns(60 * kSecond);
+  }
+  int run() {
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const int code = run_ptp(kernel, options);
+    said = testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr();
+    return code;
+  }
+
+  NetworkKernel kernel;
+  PtpOptions options;
+  std::string said;
+};
+
+TEST(PtpPort, without_a_path_delay_it_is_not_locked_and_says_why) {
+  Link link;
+  link.kernel.stamp_delay_ns = -1.0;
+  EXPECT_EQ(link.run(), kNotLocked);
+  EXPECT_EQ(occurrences(link.said, "no path delay was measured"), 2U) << "and at the end";
+  EXPECT_NE(link.said.find("summary: not locked"), std::string::npos) << link.said;
+}
+
+TEST(PtpPort, transmit_stamps_that_take_longer_than_their_timeout_measure_the_path) {
+  Link link;
+  link.kernel.stamp_delay_ns = 60e6;
+  EXPECT_EQ(link.run(), kSuccess) << link.said;
+  EXPECT_NE(link.said.find("one that comes later is used"), std::string::npos) << link.said;
+  EXPECT_EQ(link.said.find("no path delay"), std::string::npos) << link.said;
+}
+
+TEST(PtpPort, a_reference_that_jumps_is_followed_or_refused_as_at_the_start_and_it_says_so) {
+  struct Case {
+    double jump_ns;
+    bool first_step;
+    int code;
+    const char* said;
+  };
+  for (const Case& expected :
+       {Case{0.75 * kSecond, false, kSuccess, "starting anew; slewing the clock there takes 25."},
+        Case{2 * kSecond, true, kSuccess, "starting anew; the clock is stepped there"},
+        Case{2 * kSecond, false, kRuntimeError, "more than 1 s is refused as a first offset is"}}) {
+    Link link;
+    link.options.first_step = expected.first_step;
+    link.kernel.on_second = [&] {
+      if (link.kernel.ideal_ns > 20 * kSecond) {
+        link.kernel.reference_ahead = kTai + expected.jump_ns;
+      }
+    };
+    EXPECT_EQ(link.run(), expected.code) << expected.said;
+    EXPECT_EQ(occurrences(link.said, "the reference jumped by +"), 1U) << link.said;
+    EXPECT_NE(link.said.find(expected.said), std::string::npos) << link.said;
+  }
 }
 
 }  // namespace

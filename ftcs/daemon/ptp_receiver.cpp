@@ -117,9 +117,6 @@ void PtpReceiver::tell(const ptp::Action& action) {
           to_text(seen->port).view());
   } else if (const auto* selected = std::get_if<ptp::TransmitterSelected>(&action)) {
     on_selected(*selected);
-  } else if (const auto* jumped = std::get_if<ptp::ReferenceJumped>(&action)) {
-    log()(LogLevel::kWarning, "port 1 ({}): the reference jumped by {:.9f} s; starting anew",
-          options().interface, jumped->jump.seconds());
   }
 }
 
@@ -170,7 +167,17 @@ bool PtpReceiver::log_missing(LogLevel level) {
   if (no_peer) {
     log()(level, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
   }
-  return !had_transmitter_ || no_peer;
+  const ptp::Counters& counted = node_.port().counters();
+  const bool no_answer =
+      !options().peer_to_peer() && had_transmitter_ && !node_.discipline().path_delay_known();
+  if (no_answer) {
+    log()(level,
+          "no path delay was measured: {} Delay_Req sent, {} answered, {} without a transmit "
+          "timestamp; not locked, as the offset may be off by the length of the path",
+          counted[ptp::Counter::kDelayReqSent], counted[ptp::Counter::kDelayRespReceived],
+          counted[ptp::Counter::kMissingTransmitStamp]);
+  }
+  return !had_transmitter_ || no_peer || no_answer;
 }
 
 int PtpReceiver::finish() {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/fake_network.h"
 #include "ftcs/daemon/phc/phc_runner.h"
 #include "ftcs/daemon/ptp_port.h"
 #include "ftcs/platform/fake_clocks.h"
@@ -18,85 +19,8 @@ namespace {
 
 using platform::FakeClocks;
 
-constexpr double kSecond = 1e9;
 constexpr double k1970 = -static_cast<double>(FakeClocks::kEpoch) + 100 * kSecond;
-constexpr double kTai = 37 * kSecond;
 constexpr std::int64_t kBuilt = FakeClocks::kEpoch / 1'000'000'000 - 86'400;
-
-/// A kernel with a transmitter 10 us away at its network interface: Announce and one-step Sync once
-/// a second, and an answer to each Delay_Req.
-class NetworkKernel final : public FakeClocks {
- public:
-  double reference_ahead = kTai;  ///< of ideal time
-  std::uint16_t flags = ptp::flag::kPtpTimescale | ptp::flag::kUtcOffsetValid;
-  std::function<void()> on_second;
-
-  int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override {
-    if (ideal_ns >= next_ns_) transmit();
-    int ready = 0;
-    for (pollfd& entry : descriptors) {
-      entry.revents = 0;
-      const auto socket = sockets.find(entry.fd);
-      if (socket == sockets.end()) continue;
-      if (!socket->second.received.empty()) entry.revents |= POLLIN;
-      if (!socket->second.error_queue.empty()) entry.revents |= POLLPRI;
-      ready += entry.revents != 0 ? 1 : 0;
-    }
-    return ready > 0 ? ready : FakeClocks::poll(descriptors, std::min(timeout_ms, 20));
-  }
-  ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
-                  const platform::SocketAddress&) noexcept override {
-    const auto message = ptp::decode(bytes);
-    if (message && std::holds_alternative<ptp::DelayReq>(message->body)) {
-      queue_tx_stamp(fd, bytes, stamp(system), stamp(phc));
-      run(kPath);
-      ptp::Message answer = about(message->header.sequence_id);
-      answer.body = ptp::DelayResp{reference(), message->header.source};
-      deliver(320, answer);
-    }
-    return static_cast<ssize_t>(bytes.size());
-  }
-
- private:
-  static constexpr double kPath = 10'000.0;
-  static std::int64_t stamp(const Clock& clock) { return kEpoch + std::llround(clock.time_ns); }
-  [[nodiscard]] ReferenceTime reference() const {
-    return ReferenceTime::from_ns(kEpoch + std::llround(ideal_ns + reference_ahead));
-  }
-  static ptp::Message about(std::uint16_t sequence) {
-    ptp::Message message;
-    message.header.source = {ptp::ClockIdentity{{1, 2, 3, 4, 5, 6, 7, 8}}, 1};
-    message.header.sequence_id = sequence;
-    message.header.log_interval = 0;
-    return message;
-  }
-  void transmit() {
-    next_ns_ = ideal_ns + kSecond;
-    if (on_second) on_second();
-    ptp::Message announce = about(sequence_);
-    announce.header.flags = flags;
-    ptp::Announce body;
-    body.utc_offset = 37;
-    body.grandmaster = announce.header.source.clock;
-    announce.body = body;
-    deliver(320, announce);
-    ptp::Message sync = about(sequence_++);
-    sync.body = ptp::Sync{reference()};
-    run(kPath);
-    deliver(319, sync);
-  }
-  void deliver(std::uint16_t port, const ptp::Message& message) {
-    const auto bytes = ptp::encode(message);
-    const auto view = bytes->view();
-    for (auto& [fd, socket] : sockets) {
-      if (socket.port != port) continue;
-      socket.received.push_back({{view.begin(), view.end()}, stamp(system), stamp(phc)});
-    }
-  }
-
-  double next_ns_ = 0.0;
-  std::uint16_t sequence_ = 0;
-};
 
 class WrongEpoch : public testing::Test {
  protected:

@@ -124,7 +124,10 @@ JumpPlan ClockDiscipline::on_reference_jump(Duration jump) noexcept {
 }
 
 Duration ClockDiscipline::slew_time(Duration jump) const noexcept {
-  const double limit = (jump < Duration{} ? limits_.slowest : limits_.fastest).ratio();
+  const bool plans = config_.servo.kind == ServoKind::kAdaptive;
+  const RateLimits limits =
+      plans ? intersect(limits_, config_.servo.adaptive.steering.rate) : limits_;
+  const double limit = (jump < Duration{} ? limits.slowest : limits.fastest).ratio();
   double speed = std::abs(limit / telemetry_.tracking_rate.ratio() - 1.0);
   if (config_.largest_rate_change > 0.0) speed = std::min(speed, config_.largest_rate_change);
   return Duration::from_ns(std::abs(jump.ns()) / speed);

@@ -194,6 +194,15 @@ void ClockFollower::on_new_reference() noexcept {
   discipline_.on_new_reference();
 }
 
+void ClockFollower::on_reference_jump(Duration jump) noexcept {
+  waiting_.reset();
+  forget_stamps();
+  Note jumped = note(NoteKind::kReferenceJumped);
+  jumped.jump = jump;
+  jumped.plan = discipline_.on_reference_jump(jump);
+  tell(jumped);
+}
+
 void ClockFollower::on_new_timescale() noexcept {
   forget_stamps();
   discipline_.on_new_timescale();

@@ -57,6 +57,9 @@ class ClockFollower {
   void on_silence() noexcept;
   /// Another reference: what was learnt about the old one is void.
   void on_new_reference() noexcept;
+  /// The same reference, at another time: told, with what will happen
+  /// (ClockDiscipline::on_reference_jump()).
+  void on_reference_jump(Duration jump) noexcept;
   /// The clock was put onto another timescale: begins anew, the bound of the first offset included.
   void on_new_timescale() noexcept;
 

@@ -194,6 +194,23 @@ TEST_F(PeerDecisions, stamps_that_depart_are_told_by_how_much_and_the_start_is_a
   EXPECT_EQ(follower->discipline().counters().new_references, 1U);
 }
 
+TEST_F(Decisions, a_jump_of_the_reference_is_told_with_what_becomes_of_it) {
+  config.discipline.largest_first_offset = std::chrono::seconds{1};
+  begin();
+  for (int i = 0; i < 20; ++i) {
+    sync();
+    request();
+  }
+  follower->on_reference_jump(Duration::from_whole_ns(-kSecond / 2));
+  follower->on_reference_jump(Duration::from_whole_ns(2 * kSecond));
+  take();
+  EXPECT_EQ(kinds(), (std::vector{NoteKind::kReferenceJumped, NoteKind::kReferenceJumped}));
+  EXPECT_EQ(notes[0].plan.response, JumpResponse::kSlewed);
+  EXPECT_GT(notes[0].plan.slew, Duration{});
+  EXPECT_EQ(notes[1].plan.response, JumpResponse::kRefused);
+  EXPECT_EQ(follower->discipline().counters().new_references, 2U);
+}
+
 TEST_F(PeerDecisions, stamps_that_never_agreed_are_told_without_a_new_start) {
   begin();
   peer_cycles(100, 37 * kSecond);

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/discipline/jump_plan.h"
 #include "ftcs/discipline/telemetry.h"
 #include "ftcs/time/timestamp_pair.h"
 
@@ -31,6 +32,7 @@ enum class NoteKind : std::uint8_t {
   kHoldover,            ///< no usable Sync for a while; refused_syncs came in vain. Rate is kept
   kFirstOffsetRefused,  ///< offset exceeds DisciplineConfig::largest_first_offset: not steered
   kClockRefused,        ///< error; the first of a series of commands that the clock did not take
+  kReferenceJumped,     ///< by jump; plan is what becomes of it
 };
 
 /// Fields that a kind does not name are zero.
@@ -40,6 +42,8 @@ struct Note {
   std::uint32_t refused_syncs = 0;  ///< in a row
   Duration offset{};                ///< local minus reference
   ClockError error{};
+  Duration jump{};  ///< of the reference, positive: ahead
+  JumpPlan plan{};
 };
 
 using FollowerEvent = std::variant<Steered, Note>;

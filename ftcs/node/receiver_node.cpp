@@ -86,8 +86,8 @@ bool ReceiverNode::keeps(const ptp::Action& action) noexcept {
     if (change->to == ptp::PortState::kFaulty) follower_.on_new_link();
   } else if (const auto* selected = std::get_if<ptp::TransmitterSelected>(&action)) {
     if (selected->changed && std::exchange(had_transmitter_, true)) follower_.on_new_reference();
-  } else if (std::holds_alternative<ptp::ReferenceJumped>(action)) {
-    follower_.on_new_reference();
+  } else if (const auto* jumped = std::get_if<ptp::ReferenceJumped>(&action)) {
+    follower_.on_reference_jump(jumped->jump);
   }
   return false;
 }
