@@ -15,6 +15,7 @@ namespace ftcs::estimation {
 struct ChangeTrust {
   bool sudden = true;        ///< a clock can have brought it; else nothing that one message shows
   bool one_suffices = true;  ///< one message without a second that says the same
+  bool seconded = true;      ///< there is such a second
 };
 
 /// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between the models of a
@@ -81,7 +82,7 @@ class ChangeDetector {
     const double before = static_cast<double>(sum(i, winner)) - latest;
     const bool alone = before < (trust.one_suffices ? kSecond : kAbrupt);
     if (!trust.sudden && (abrupt || winner >= kSudden)) return {};
-    if (alone && !trust.one_suffices) return {};
+    if ((alone || (abrupt && !trust.seconded)) && !trust.one_suffices) return {};
     const double enough = (alone ? kAlone : kThreshold) * caution;
     const double needed = abrupt ? enough : std::max(enough, kGradual);
     if (sum(i, winner) <= static_cast<float>(needed)) return {};

@@ -11,33 +11,41 @@ namespace ftcs::estimation {
 /// Learns what early messages mean here. One that comes far before the moment believed is a clock
 /// whose rate has changed, or an outlier: a late transmit stamp, a lucky packet on a loaded bridge.
 /// The next messages tell. Until changes have proved to be the rule no single message changes the
-/// rate; and how often each direction has outliers is its share of what was believed early.
+/// rate; and how often each direction has outliers is its share of what came early. Late ones,
+/// which are common, are only remembered until the next of their direction tells.
 class EarlyMessages {
  public:
-  /// A message was judged: `far`: beyond five sigma early and taken for an outlier; `fits`: as
-  /// believed.
-  /// True: an early one before has proved to be an outlier; what spoke for a change is void.
-  [[nodiscard]] bool observe(Direction direction, bool far, bool fits) noexcept {
+  enum class Message : std::uint8_t { kFits, kEarly, kLate, kNeither };
+  /// A message was judged: as believed, far before it, far after it, or between. True: one before
+  /// that was far off has proved to be an outlier, and what it said for a change is void.
+  [[nodiscard]] bool observe(Direction direction, Message message) noexcept {
     Side& side = sides_[direction];
-    side.messages =
-        std::min<std::uint16_t>(static_cast<std::uint16_t>(side.messages + 1U), kMemory);
-    if (side.messages == kMemory) {
+    ++side.messages;
+    if (side.messages >= kMemory) {
       side.messages /= 2;
       side.outliers /= 2;
     }
+    const bool fits = message == Message::kFits;
     if (doubted_ > 0) {
       --doubted_;
-      if (far || !fits) outlier(direction);
+      if (!fits) outlier(direction);
     }
-    const bool explained = side.pending && !far && fits;
-    if (explained) outlier(direction);
-    side.pending = side.pending || far;
+    const bool explained = fits && (side.pending || side.late);
+    if (fits && side.pending) outlier(direction);
+    side.pending = side.pending || message == Message::kEarly;
+    side.late = (side.late && !fits) || message == Message::kLate;
     return explained;
   }
   /// A rate that has changed makes one direction ever earlier, the other later: whether this
   /// message says otherwise than an early one that is not explained yet.
   [[nodiscard]] bool contradicted_by(Direction direction, bool early) const noexcept {
     return early ? sides_[opposite(direction)].pending : sides_[direction].pending;
+  }
+  /// Whether it says the same as one that is not explained yet.
+  [[nodiscard]] bool seconded_by(Direction direction, bool early) const noexcept {
+    const Side& own = sides_[direction];
+    const Side& other = sides_[opposite(direction)];
+    return early ? own.pending || other.late : own.late || other.pending;
   }
   /// The rate was changed; `alone`: for the last message's sake alone.
   void changed(bool alone) noexcept {
@@ -63,6 +71,7 @@ class EarlyMessages {
     std::uint16_t messages = 0;
     std::uint16_t outliers = 0;
     bool pending = false;  ///< an early one has not been explained
+    bool late = false;     ///< nor has a late one
   };
   void outlier(Direction direction) noexcept {
     Side& side = sides_[direction];
@@ -89,8 +98,9 @@ class EarlyMessages {
 /// For a grid that has no room for it: nothing makes a packet early.
 class NoEarlyMessages {
  public:
-  [[nodiscard]] bool observe(Direction, bool, bool) noexcept { return false; }
+  [[nodiscard]] bool observe(Direction, EarlyMessages::Message) noexcept { return false; }
   [[nodiscard]] bool contradicted_by(Direction, bool) const noexcept { return false; }
+  [[nodiscard]] bool seconded_by(Direction, bool) const noexcept { return true; }
   void changed(bool) noexcept {}
   [[nodiscard]] bool one_suffices() const noexcept { return true; }
   [[nodiscard]] double probability(Direction) const noexcept { return 1e-5; }

@@ -17,8 +17,8 @@ namespace {
 constexpr double kOffsetPrior = 4e10;
 constexpr double kRatePrior = 1e10;
 constexpr double kDelayPrior = 1e10;
-/// Four and a half sigma early, squared: noise does so once in three hundred thousand messages.
-constexpr double kFarEarly = 20.0;
+/// Four and a half sigma, squared: noise does so once in three hundred thousand messages.
+constexpr double kFarOff = 20.0;
 /// Messages after which each of these may begin; before, every prediction is still prior.
 constexpr std::uint32_t kEvidenceFrom = 3;
 constexpr std::uint32_t kMixFrom = 4;
@@ -202,12 +202,16 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
   if (count_ > kJudgeFrom) {
     gate_.learn(side, credit);
     lateness_.observe(side, innovations.centred[best_] > 0.0, innovations.distance[best_]);
+    using Message = EarlyMessages::Message;
     const bool early = innovations.centred[best_] < 0.0;
-    const bool far = early && innovations.distance[best_] > kFarEarly;
+    const bool far = innovations.distance[best_] > kFarOff;
+    const Message message = far ? (early ? Message::kEarly : Message::kLate)
+                                : (credit >= 0.5 ? Message::kFits : Message::kNeither);
     const bool contradicted = early_.contradicted_by(direction_of(seen), early);
-    if (early_.observe(direction_of(seen), far, credit >= 0.5)) detector_.clear();
+    const bool seconded = early_.seconded_by(direction_of(seen), early);
+    if (early_.observe(direction_of(seen), message)) detector_.clear();
     const bool clock = (!two_way() || lateness_.speaks_of_clock()) && !contradicted;
-    detect_changes(innovations.log_density, {clock, early_.one_suffices()});
+    detect_changes(innovations.log_density, {clock, early_.one_suffices(), seconded});
   }
   if (follow_gate(side, credit, innovation)) {
     if (count_ == 0 || diverged_) return 0.0;
