@@ -211,7 +211,8 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     const bool seconded = early_.seconded_by(direction_of(seen), early);
     if (early_.observe(direction_of(seen), message)) detector_.clear();
     const bool clock = (!two_way() || lateness_.speaks_of_clock()) && !contradicted;
-    detect_changes(innovations.log_density, {clock, early_.one_suffices(), seconded});
+    const bool suffices = early_.one_suffices() || count_ <= kOpinionOften;
+    detect_changes(innovations.log_density, {clock, suffices, seconded});
   }
   if (follow_gate(side, credit, innovation)) {
     if (count_ == 0 || diverged_) return 0.0;
