@@ -22,7 +22,9 @@ struct TwoMachinesWorld {
   double cable_ns = 500.0;         ///< to the grandmaster, one way
   double frame_stamp_ns = 100.0;   ///< white noise of the host's stamps of its EtherCAT frames
   double mean_lateness_us = 20.0;  ///< exponential above 20 us, cut at 200 us
-  double receiver_s = 8.0;         ///< PTP runs so long before the segment is switched on
+  double mean_stack_us = 3.0;      ///< from the clock's reading to the wire: exponential above 5 us
+  node::BusWrite write = node::BusWrite::kOffset;
+  double receiver_s = 8.0;  ///< PTP runs so long before the segment is switched on
   double settling_s = 30.0;
   double measured_s = 10.0;
   double radius_um = 25'000.0;

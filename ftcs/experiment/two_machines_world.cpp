@@ -94,6 +94,7 @@ node::CycleNodeConfig PlantMachine::node_config(const TwoMachinesWorld& world, n
   config.servo.cycle = world.cycle;
   config.servo.transit = kCable;
   config.bus_mode = mode;
+  config.bus_write = world.write;
   config.axes.radius = world.radius_um;
   config.axes.turn_s = world.turn_s;
   // Both machines are ready by then.
@@ -122,6 +123,10 @@ PlantMachine::PlantMachine(const TwoMachinesWorld& world, node::BusMode mode, bo
   host_ = std::make_unique<sim::CycleHost>(node_config(world, mode), *segment_, start, &crystal_);
   host_->set_stamp_noise(
       [this] { return Duration::from_ns(world_.frame_stamp_ns * noise_.normal()); });
+  host_->set_stack_delay([this] {
+    constexpr double kLeast_us = 5.0;
+    return Duration::from_ns(1e3 * (kLeast_us + world_.mean_stack_us * noise_.exponential()));
+  });
   if (plant) host_->set_plant_clock([this](FreeRunningTime t) { return receiver_.at(t); });
 }
 

@@ -7,6 +7,11 @@
 
 namespace ftcs::node {
 
+namespace {
+/// The frame has half a cycle until SYNC0: who leads may be off the drives by a little, no more.
+constexpr Nanoseconds kLeadBand{5'000};
+}  // namespace
+
 CycleNode::Objects CycleNode::objects_for(const CycleNodeConfig& config) noexcept {
   Objects objects{};
   const auto csp = ethercat::csp_objects(config.servo.cycle);
@@ -29,7 +34,7 @@ ethercat::MainDeviceConfig CycleNode::main_config(const CycleNodeConfig& config,
 
 BusClockConfig CycleNode::bus_config(const CycleNodeConfig& config) noexcept {
   BusClockConfig result = config.bus;
-  result.steer = config.bus_mode != BusMode::kFollow;
+  result.steer = config.bus_mode != BusMode::kFollow && config.bus_write == BusWrite::kOffset;
   result.cycle = config.servo.cycle;
   result.sync0_phase = config.sync0_phase;
   return result;
@@ -49,7 +54,15 @@ const CycleDecision& CycleNode::start(FreeRunningTime now) noexcept {
   return decision_;
 }
 
-ethercat::ConstBytes CycleNode::begin_cycle(FreeRunningTime now) noexcept {
+/// As other MainDevices do it; here to be compared with.
+void CycleNode::write_time(FreeRunningTime now, ReferenceTime plant) noexcept {
+  const Duration late =
+      config_.bus_write == BusWrite::kTargetTime ? now - decision_.wake : Duration{};
+  main_.write_system_time(plant - late + Duration{config_.servo.transit});
+}
+
+ethercat::ConstBytes CycleNode::begin_cycle(FreeRunningTime now,
+                                            std::optional<ReferenceTime> plant) noexcept {
   notes_.clear();
   // All axes from one time: the reference's, as the steered clock knows it.
   const double time_s = servo_.next_trigger().local.since_epoch().seconds();
@@ -59,6 +72,9 @@ ethercat::ConstBytes CycleNode::begin_cycle(FreeRunningTime now) noexcept {
     const LocalTime at_reference = servo_.local_at(now) + Duration{config_.servo.transit};
     main_.set_reference_estimate(relabel<ReferenceTime>(at_reference));
   }
+  const bool writes =
+      config_.bus_mode != BusMode::kFollow && config_.bus_write != BusWrite::kOffset;
+  if (writes && plant) write_time(now, *plant);
   return main_.next_frame();
 }
 
@@ -71,17 +87,22 @@ const CycleDecision& CycleNode::end_cycle(bool answered, const ethercat::FrameSt
   sample_.has_received = answered;
   sample_.has_reference = answered && main_.last_cycle().has_reference;
   sample_.reference = main_.last_cycle().reference;
-  // In lead it is plant time that the cycle follows; should it stay away, the drives still have it.
-  if (config_.bus_mode == BusMode::kLead && answered && stamps.has_system_time) {
-    sample_.has_reference = true;
-    sample_.reference = stamps.system_time + Duration{config_.servo.transit};
-  }
+  if (config_.bus_mode == BusMode::kLead && sample_.has_reference) lead(stamps);
   decision_ = servo_.update(sample_, now);
   watch_bus(answered, stamps);
   const bool ready =
       config_.bus_mode == BusMode::kFollow || bus_.decision().state == BusClockState::kLocked;
   supervision_.cycle(main_, decision_.state, ready, notes_);
   return decision_;
+}
+
+/// It is plant time that the cycle follows, as long as the drives are there too: should plant time
+/// stay away, or jump, the cycle stays with its drives.
+void CycleNode::lead(const ethercat::FrameStamps& stamps) noexcept {
+  if (!stamps.has_system_time) return;
+  const ReferenceTime plant = stamps.system_time + Duration{config_.servo.transit};
+  const LocalTime drives = relabel<LocalTime>(sample_.reference);
+  if (abs(offset_from_reference(drives, plant)) < Duration{kLeadBand}) sample_.reference = plant;
 }
 
 void CycleNode::watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept {
@@ -98,7 +119,9 @@ void CycleNode::watch_bus(bool answered, const ethercat::FrameStamps& stamps) no
   bus_offset_ns_ = bus_.decision().offset_ns;  // this frame has written it
   offset_certain_ = answered;
   const BusClockDecision& decision = bus_.update(sample);
-  main_.shift_system_time(decision.offset_ns - bus_offset_ns_);
+  if (config_.bus_write == BusWrite::kOffset) {
+    main_.shift_system_time(decision.offset_ns - bus_offset_ns_);
+  }
   if (decision.state == before) return;
   if (decision.state == BusClockState::kHoldover) notes_.add(Kind::kPlantTimeLost);
   if (before == BusClockState::kHoldover) notes_.add(Kind::kPlantTimeBack);

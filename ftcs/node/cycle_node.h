@@ -23,6 +23,13 @@ enum class BusMode : std::uint8_t {
   kExternal,  ///< the cycle follows the drives, the drives follow plant time (DCX, external sync)
 };
 
+/// How the bus is moved, where it is (decision 0017 has the figures).
+enum class BusWrite : std::uint8_t {
+  kOffset,      ///< increments of 0x0920: a difference has no lateness
+  kTargetTime,  ///< plant time of the cycle's own instant to 0x0910, as IgH: late as the frame is
+  kReadTime,    ///< plant time as read before the frame is sent to 0x0910: late as the stack is
+};
+
 struct CycleNodeConfig {
   /// Its process.objects, cycle and sync0_shift are set by the node.
   ethercat::MainDeviceConfig main;
@@ -33,6 +40,7 @@ struct CycleNodeConfig {
   /// drive faults above the limit; 0: never. No value: what the drive has of itself.
   std::optional<std::uint16_t> sync_error_limit;
   BusMode bus_mode = BusMode::kFollow;
+  BusWrite bus_write = BusWrite::kOffset;
   BusClockConfig bus;  ///< its steer, cycle and sync0_phase are set by the node
   DriveSupervisionConfig supervision;
   DriveAxesConfig axes;
@@ -68,8 +76,10 @@ class CycleNode {
 
   /// The cyclic part begins: the first trigger.
   const CycleDecision& start(FreeRunningTime now) noexcept;
-  /// At a trigger: the axes move, the frame of the cycle is written.
-  [[nodiscard]] ethercat::ConstBytes begin_cycle(FreeRunningTime now) noexcept;
+  /// At a trigger: the axes move, the frame of the cycle is written. `plant`: plant time now, for
+  /// BusWrite::kTargetTime and kReadTime alone.
+  [[nodiscard]] ethercat::ConstBytes begin_cycle(
+      FreeRunningTime now, std::optional<ReferenceTime> plant = std::nullopt) noexcept;
   /// The frame of this cycle left at `sent` and came back (`answered`) at `received`, or did not;
   /// it is `now`. What follows for servo and drives; notes() are of this cycle.
   const CycleDecision& end_cycle(bool answered, const ethercat::FrameStamps& stamps,
@@ -101,6 +111,8 @@ class CycleNode {
   [[nodiscard]] static ethercat::MainDeviceConfig main_config(const CycleNodeConfig& config,
                                                               const Objects& objects) noexcept;
   [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
+  void write_time(FreeRunningTime now, ReferenceTime plant) noexcept;
+  void lead(const ethercat::FrameStamps& stamps) noexcept;
   void watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept;
 
   CycleNodeConfig config_;

@@ -61,7 +61,10 @@ bool CycleHost::bring_up() {
 
 const CycleDecision& CycleHost::cycle(Duration late, bool lost) {
   now_ = std::max(now_, instant_of(node_->decision().wake + late));
-  const bool answered = pass(node_->begin_cycle(shown_at(now_)), lost);
+  const FreeRunningTime read = shown_at(now_);
+  const ethercat::ConstBytes frame = node_->begin_cycle(read, plant_ ? plant_(read) : std::nullopt);
+  if (stack_) wait(stack_());
+  const bool answered = pass(frame, lost);
   wait(Duration{kReplyTime});
   return node_->end_cycle(answered, stamps_, shown_at(now_));
 }

@@ -33,6 +33,8 @@ class CycleHost {
   void set_plant_clock(PlantClock clock) { plant_ = std::move(clock); }
   /// Noise of the stamps that the host has of its frames, set anew for each.
   void set_stamp_noise(std::function<Duration()> noise) { noise_ = std::move(noise); }
+  /// From reading the clock to the frame on the wire, drawn anew for each cycle.
+  void set_stack_delay(std::function<Duration()> delay) { stack_ = std::move(delay); }
   /// Until the cyclic part; false: it came to an end before, node().main().failure() tells why.
   bool bring_up();
   /// One cycle whose task wakes `late` after its trigger, and whose frame does not come back if it
@@ -61,6 +63,7 @@ class CycleHost {
   ethercat::FrameStamps stamps_;
   PlantClock plant_;
   std::function<Duration()> noise_;
+  std::function<Duration()> stack_;
   std::array<std::uint8_t, ethercat::kMaxFrameSize> buffer_{};
 };
 

@@ -67,6 +67,14 @@ void CyclicExchange::request(FrameWriter& writer, const Network& network) noexce
     store(time, 0, static_cast<std::uint64_t>(estimate_.since_epoch().rounded_ns()));
     ++datagrams_;
   }
+  wrote_time_ = writes_time_ && asks_reference(network);
+  writes_time_ = false;
+  if (wrote_time_) {
+    const SubDeviceInfo& reference = network.devices[network.reference];
+    writer.add_value(reference.target(kFpwr, reg::kSystemTime),
+                     static_cast<std::uint64_t>(written_time_.since_epoch().rounded_ns()));
+    ++datagrams_;
+  }
   writes_offset_ = offset_changed_ && asks_reference(network);
   if (writes_offset_) {
     const SubDeviceInfo& reference = network.devices[network.reference];
@@ -133,6 +141,7 @@ CycleReport CyclicExchange::reply(const FrameView& frame, Network& network) noex
     take_reference(*datagram, network, report);
     ++datagram;
   }
+  if (wrote_time_) ++datagram;
   if (writes_offset_) {
     if ((*datagram).working_counter() == 1) offset_changed_ = false;
     ++datagram;

@@ -59,6 +59,12 @@ class CyclicExchange {
   void set_reference_estimate(ReferenceTime estimate) noexcept { estimate_ = estimate; }
   /// The reference's system time offset has changed (0x0920): sent until it was taken.
   void write_system_time_offset() noexcept { offset_changed_ = true; }
+  /// The next frame tells the reference this system time (0x0910), as a drift datagram does to the
+  /// others: its own control loop follows.
+  void write_system_time(ReferenceTime time) noexcept {
+    written_time_ = time;
+    writes_time_ = true;
+  }
   /// Datagrams of the last request.
   [[nodiscard]] std::size_t datagrams() const noexcept { return datagrams_; }
   [[nodiscard]] Bytes outputs(const SubDeviceInfo& device) noexcept {
@@ -86,6 +92,9 @@ class CyclicExchange {
   ReferenceTime estimate_;
   bool offset_changed_ = false;
   bool writes_offset_ = false;  ///< in the frame that is out
+  ReferenceTime written_time_;
+  bool writes_time_ = false;  ///< in the next frame
+  bool wrote_time_ = false;   ///< in the frame that is out
   std::size_t datagrams_ = 0;
   std::array<std::uint16_t, kMaxSubDevices> control_{};  ///< zero: nothing to send
   std::size_t turn_ = 0;

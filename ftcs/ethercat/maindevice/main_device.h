@@ -123,6 +123,8 @@ class MainDevice {
   /// In the cyclic stage: from the next frame on the reference's system time shows so much more
   /// (0x0920). Small steps alone: SYNC0 is running.
   void shift_system_time(std::int64_t by_ns) noexcept;
+  /// CyclicExchange::write_system_time().
+  void write_system_time(ReferenceTime time) noexcept { exchange_.write_system_time(time); }
   /// System time of the first SYNC0.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return configurator_.sync0_start(); }
 
