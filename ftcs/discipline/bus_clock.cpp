@@ -63,7 +63,7 @@ void BusClock::on_new_plant_time() noexcept {
 
 const BusClockDecision& BusClock::update(const BusClockSample& sample) noexcept {
   carry_on();
-  if (sample.usable) average(sample);
+  if (sample.usable) collect(sample);
   if (++cycles_ >= cycles_per_sample_) {
     estimate();
     judge();
@@ -74,24 +74,30 @@ const BusClockDecision& BusClock::update(const BusClockSample& sample) noexcept 
   return decision_;
 }
 
-void BusClock::average(const BusClockSample& sample) noexcept {
+void BusClock::collect(const BusClockSample& sample) noexcept {
   if (used_ == 0) {
     first_ = sample;
-    sum_crystal_ns_ = sum_plant_ns_ = 0.0;
+    sum_crystal_ns_ = 0.0;
   }
   crystal_ = crystal_of(sample);
-  sum_crystal_ns_ += (crystal_ - crystal_of(first_)).ns();
-  sum_plant_ns_ += (sample.plant - first_.plant).ns();
-  ++used_;
+  const std::uint32_t stride = cycles_per_sample_ / kMostKept + 1;
+  if (used_ > 0 && (cycles_ % stride != 0 || used_ == kMostKept)) return;
+  const double crystal_ns = (crystal_ - crystal_of(first_)).ns();
+  const double plant_ns = (sample.plant - first_.plant).ns();
+  sum_crystal_ns_ += crystal_ns;
+  residuals_[used_++] = static_cast<float>(plant_ns - crystal_ns * (1.0 + tracking_));
 }
 
-/// The mean of pairs on a line is a pair on it.
+/// The middle of the interval, on a line of the known rate through the median.
 void BusClock::estimate() noexcept {
   missed_ = used_ == 0 ? missed_ + 1 : 0;
   if (used_ == 0) return;
-  const double count = used_;
-  const FreeRunningTime crystal = crystal_of(first_) + Duration::from_ns(sum_crystal_ns_ / count);
-  const ReferenceTime plant = first_.plant + Duration::from_ns(sum_plant_ns_ / count);
+  auto* const middle = residuals_.begin() + used_ / 2;
+  std::nth_element(residuals_.begin(), middle, residuals_.begin() + used_);
+  const double crystal_ns = sum_crystal_ns_ / static_cast<double>(used_);
+  const double plant_ns = crystal_ns * (1.0 + tracking_) + static_cast<double>(*middle);
+  const FreeRunningTime crystal = crystal_of(first_) + Duration::from_ns(crystal_ns);
+  const ReferenceTime plant = first_.plant + Duration::from_ns(plant_ns);
   const Duration offset = Duration::from_ns(offset_ns_);
   const LocalTime shown = relabel<LocalTime>(crystal + offset);
   // The frame has just written the offset that was decided a cycle ago; SYNC0 is still to come.

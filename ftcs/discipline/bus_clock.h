@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "ftcs/discipline/lock_detector.h"
@@ -13,7 +15,7 @@ struct BusClockConfig {
   bool steer = true;
   Nanoseconds cycle{1'000'000};  ///< above zero
   double sync0_phase = 0.5;      ///< SYNC0 comes this part of a cycle after the frame; 0 to 1
-  /// The samples of so long a time are averaged before the estimator hears them; >= cycle.
+  /// Of the samples of so long a time the estimator hears the middle one; >= cycle.
   Nanoseconds sample_interval{125'000'000};
   /// An offset is removed with this time constant, where no limit binds; several sample intervals.
   Nanoseconds time_constant{500'000'000};
@@ -71,6 +73,9 @@ struct BusClockDecision {
 ///   pull                     = -sign(e) min(|e| / T, pull_max, 0.7 sqrt(2 s |e|))
 ///   rate                    -> target, by at most s = largest_slope per second
 ///
+/// One stamp of a busy host in two hundred is tens of microseconds off: of the cycles of a sample
+/// interval the median is taken, against a line of the rate that is known.
+///
 /// Between two frames R runs with L and not with plant time: a saw tooth of 100 ns at 100 ppm and
 /// 1 ms. e is what it is at SYNC0, the instant that drives act on.
 ///
@@ -89,7 +94,7 @@ class BusClock {
 
  private:
   void carry_on() noexcept;
-  void average(const BusClockSample& sample) noexcept;
+  void collect(const BusClockSample& sample) noexcept;
   void estimate() noexcept;
   void judge() noexcept;
   void move() noexcept;
@@ -104,10 +109,11 @@ class BusClock {
   BusClockDecision decision_;
   std::uint32_t cycles_per_sample_;
   std::uint32_t cycles_ = 0;  ///< of the sample under way
-  std::uint32_t used_ = 0;    ///< of them usable
+  std::uint32_t used_ = 0;    ///< of them kept
   BusClockSample first_;      ///< usable one of the sample under way
   double sum_crystal_ns_ = 0.0;
-  double sum_plant_ns_ = 0.0;
+  static constexpr std::uint32_t kMostKept = 256;
+  std::array<float, kMostKept> residuals_{};  ///< ns, against a line of the known rate
   ReferenceTime last_plant_;
   std::uint32_t missed_ = 0;  ///< sample intervals without a sample
   double error_ns_ = 0.0;     ///< e, carried on between samples

@@ -32,6 +32,8 @@ struct EthercatArguments {
   std::string lock = "5us";
   std::string spin = "0";
   std::string lock_policy = "recovering";
+  std::string bus_mode = "follow";
+  std::string bus_write = "offset";
   std::vector<double> gains;
   bool slew = false;
 };
@@ -61,6 +63,16 @@ Wrong read_law(EthercatArguments& arguments) {
 node::LockPolicy policy_of(const std::string& name) {
   if (name == "advisory") return node::LockPolicy::kAdvisory;
   return name == "fatal" ? node::LockPolicy::kFatal : node::LockPolicy::kRecovering;
+}
+
+node::BusMode mode_of(const std::string& name) {
+  if (name == "lead") return node::BusMode::kLead;
+  return name == "external" ? node::BusMode::kExternal : node::BusMode::kFollow;
+}
+
+node::BusWrite write_of(const std::string& name) {
+  if (name == "target-time") return node::BusWrite::kTargetTime;
+  return name == "read-time" ? node::BusWrite::kReadTime : node::BusWrite::kOffset;
 }
 
 Wrong complete(EthercatArguments& arguments) {
@@ -97,6 +109,12 @@ Wrong complete(EthercatArguments& arguments) {
       static_cast<std::uint32_t>(std::max<std::int64_t>(1, interval / servo.cycle));
   servo.align_at_start = !arguments.slew;
   options.lock_policy = policy_of(arguments.lock_policy);
+  options.bus_mode = mode_of(arguments.bus_mode);
+  options.bus_write = write_of(arguments.bus_write);
+  if (options.bus_mode != node::BusMode::kFollow && options.plant_time.empty()) {
+    return fmt::format("--bus-mode {}: needs --plant-time, the clock that is to be followed",
+                       arguments.bus_mode);
+  }
   return read_law(arguments);
 }
 
@@ -136,7 +154,13 @@ int with_runner(EthercatArguments arguments, Body body) {
   auto link = open_link(arguments.options);
   if (!link) return end_with(link.error().message(), kRuntimeError);
   const platform::StopFlag stop_flag;
+  platform::LinuxKernel kernel;
   const auto runner = std::make_unique<daemon::MainRunner>(arguments.options, std::move(*link));
+  if (!arguments.options.plant_time.empty()) {
+    auto plant = daemon::PlantClock::open(arguments.options.plant_time, kernel);
+    if (!plant) return end_with("--plant-time: " + plant.error(), kRuntimeError);
+    runner->set_plant_clock(std::move(*plant));
+  }
   return body(*runner, [&stop_flag] { return stop_flag.is_set(); });
 }
 
@@ -177,6 +201,10 @@ int run_main(daemon::MainRunner& runner, const std::function<bool()>& stop) {
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
+  if (options.bus_mode != node::BusMode::kFollow && !runner.main().network().has_reference()) {
+    return end_with("no drive with a distributed clock: there is nothing to put on plant time",
+                    kRuntimeError);
+  }
   runner.run(stop);
   if (!options.quiet) daemon::print_run(runner);
   // The figures are written even if a record is cut short, and whatever ended the run.
@@ -263,6 +291,35 @@ void add_drive_flags(CLI::App& command, EthercatArguments& arguments) {
   command.add_flag("!--no-motion", options.move, "leave the axes disabled");
 }
 
+void add_bus_flags(CLI::App& command, EthercatArguments& arguments) {
+  daemon::RunOptions& options = arguments.options;
+  command
+      .add_option("--bus-mode", arguments.bus_mode,
+                  "follow (default: the cycle follows the drives; master shift), lead (the cycle "
+                  "runs on plant time and the drives follow; bus shift) or external (the cycle "
+                  "follows the drives, and they plant time; DCX)")
+      ->check(CLI::IsMember({"follow", "lead", "external"}));
+  command.add_option("--plant-time", options.plant_time,
+                     "tai (CLOCK_TAI), realtime, or a PTP hardware clock such as /dev/ptp0");
+  command
+      .add_option("--bus-write", arguments.bus_write,
+                  "how the drives' clock is moved: offset (default: increments of 0x0920), or as "
+                  "others do, to compare: target-time or read-time to 0x0910")
+      ->check(CLI::IsMember({"offset", "target-time", "read-time"}));
+  command
+      .add_option("--bus-limit-ppm", options.bus_limit_ppm,
+                  "largest rate of the drives' clock against its crystal; default 400")
+      ->check(CLI::Range(1.0, 1000.0));
+  command
+      .add_option("--bus-slope-ppm-s", options.bus_slope_ppm_s,
+                  "largest change of that rate in a second; default 100")
+      ->check(CLI::Range(0.001, 10'000.0));
+  command
+      .add_option("--start-at", options.start_s,
+                  "the circles begin at this second of plant time (since 2000-01-01)")
+      ->check(CLI::Range(0.0, 1e11));
+}
+
 void add_run_flags(CLI::App& command, EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
   add_servo_flags(command, arguments);
@@ -292,6 +349,7 @@ void add_ethercat_command(CLI::App& app, int& exit_code) {
   CLI::App* run = command->add_subcommand("run", "drives in OP, cycle in phase with their clock");
   add_link_flags(*run, *arguments);
   add_run_flags(*run, *arguments);
+  add_bus_flags(*run, *arguments);
   run->callback([arguments, &exit_code] { exit_code = with_runner(*arguments, run_main); });
 }
 

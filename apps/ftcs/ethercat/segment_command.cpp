@@ -153,6 +153,9 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(0, 99));
   command->add_option("--cpu", arguments->cpu, "pin to this processor");
   command->add_option("--json", options.json, "write what the drives saw to this file");
+  command->add_option("--clock-csv", arguments->options.clock_csv,
+                      "write CLOCK_MONOTONIC and the first drive's system time to this file, each "
+                      "50 frames");
   command->callback([arguments, &exit_code] { exit_code = run_segment(*arguments); });
 }
 

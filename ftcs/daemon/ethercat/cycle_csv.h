@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "ftcs/discipline/cycle_servo_types.h"
+#include "ftcs/node/cycle_node.h"
 #include "ftcs/report/write_file.h"
 
 namespace ftcs::daemon {
@@ -21,8 +21,7 @@ class CycleCsv {
   /// Before the first cycle, of a record that is open.
   void begin();
   [[nodiscard]] bool is_open() const { return file_ != nullptr; }
-  void write(std::uint64_t cycle, const CycleDecision& decision, const CycleSample& sample,
-             std::uint16_t working_counter, std::int64_t margin_ns);
+  void write(std::uint64_t cycle, const node::CycleNode& node);
   /// What is still in the buffer goes out. No value: every line is there.
   [[nodiscard]] std::optional<WriteError> finish();
 

@@ -48,6 +48,11 @@ node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
   config.axes.radius = options.radius;
   config.axes.turn_s = options.turn_s;
   config.axes.fault_resets = options.fault_resets;
+  config.axes.start_s = options.start_s;
+  config.bus_mode = options.bus_mode;
+  config.bus_write = options.bus_write;
+  config.bus.limits = RateLimits::symmetric_ppb(1e3 * options.bus_limit_ppm);
+  config.bus.largest_slope_ppb_per_s = 1e3 * options.bus_slope_ppm_s;
   return config;
 }
 
@@ -61,6 +66,12 @@ bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) 
   stamps_.sent = stamps_.received = HostClock::now();
   if (frame.empty()) return false;
   const int error = link_.send(frame);
+  // Plant time of the first reading: the stamp of the card comes later, and is some microseconds
+  // off.
+  const auto plant = plant_ ? plant_->at(stamps_.sent) : std::nullopt;
+  const FreeRunningTime read = stamps_.sent;
+  stamps_.has_system_time = plant.has_value();
+  stamps_.system_time = plant.value_or(ReferenceTime{});
   bool answered = false;
   while (error == 0 && !answered) {
     const auto back = link_.receive(deadline, false);
@@ -69,6 +80,7 @@ bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) 
     answered = node_->on_frame(back->frame, stamps_) != ethercat::FrameOutcome::kIgnored;
   }
   if (const auto stamp = link_.transmit_stamp()) stamps_.sent = *stamp;
+  stamps_.system_time = stamps_.system_time + (stamps_.sent - read);
   return answered;
 }
 
@@ -122,19 +134,24 @@ void MainRunner::cycle() {
   const auto limit =
       static_cast<std::int64_t>(kReplyShare * static_cast<double>(options_.servo.cycle.count()));
   const FreeRunningTime woken = HostClock::now();
-  const bool answered =
-      transfer(node_->begin_cycle(woken), HostClock::now() + Duration::from_whole_ns(limit));
+  const bool answered = transfer(node_->begin_cycle(woken, plant_now(woken)),
+                                 HostClock::now() + Duration::from_whole_ns(limit));
   node_->end_cycle(answered, stamps_, HostClock::now());
   watch_.note(*node_, HostClock::now());
   if (csv_.is_open()) {
-    csv_.write(figures().cycles, decision(), node_->sample(), main().last_cycle().working_counter,
-               node_->margin_ns());
+    csv_.write(figures().cycles, *node_);
   }
   if (HostClock::now() >= next_line_) {
     next_line_ = next_line_ + Duration{kLineInterval};
     link_.refresh_clock();
     if (!options_.quiet) print_live();
   }
+}
+
+/// Only the ways to move the bus that write a time ask for it.
+std::optional<ReferenceTime> MainRunner::plant_now(FreeRunningTime now) {
+  const bool wanted = plant_ && options_.bus_write != node::BusWrite::kOffset;
+  return wanted ? plant_->at(now) : std::nullopt;
 }
 
 void MainRunner::print_live() const {
@@ -149,6 +166,11 @@ void MainRunner::print_live() const {
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
       report.expected, report.states, report.difference_bound_ns + 1, main().counters().lost,
       servo_counters().late);
+  if (plant_) {
+    fmt::print("bus {:9}  dc to plant {:+12.3f} us (sigma {:.3f})  bus rate {:+9.3f} ppm\n",
+               ftcs::name(bus().state), bus().dc_to_plant.ns() * 1e-3, bus().sigma_ns * 1e-3,
+               bus().rate_ppb * 1e-3);
+  }
   std::fflush(stdout);
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "ftcs/daemon/ethercat/cycle_csv.h"
+#include "ftcs/daemon/ethercat/plant_clock.h"
 #include "ftcs/experiment/cycle_figures.h"
 #include "ftcs/node/cycle_node.h"
 #include "ftcs/platform/ethercat_link.h"
@@ -43,6 +44,12 @@ struct RunOptions {
   bool move = true;          ///< the axes draw circles, two by two
   double radius = 10'000.0;  ///< counts
   double turn_s = 2.0;
+  double start_s = 0.0;  ///< instant of plant time at which the circles begin; zero: at once
+  node::BusMode bus_mode = node::BusMode::kFollow;
+  node::BusWrite bus_write = node::BusWrite::kOffset;
+  std::string plant_time;  ///< source (PlantClock); empty: none
+  double bus_limit_ppm = 400.0;
+  double bus_slope_ppm_s = 100.0;
   /// How often the fault of one axis is reset.
   std::uint32_t fault_resets = 0;
   bool contour = false;  ///< drives are the modelled ones: watch the circle of the first two
@@ -64,6 +71,9 @@ class MainRunner {
   [[nodiscard]] std::optional<WriteError> open_csv() {
     return options_.csv.empty() ? std::nullopt : csv_.open(options_.csv);
   }
+  /// The clock of --plant-time; before bring_up().
+  void set_plant_clock(PlantClock clock) { plant_.emplace(std::move(clock)); }
+  [[nodiscard]] const BusClockDecision& bus() const { return node_->bus(); }
   [[nodiscard]] std::optional<WriteError> finish_csv() { return csv_.finish(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).
   bool bring_up(const std::function<bool()>& stop, bool scan_only);
@@ -85,6 +95,7 @@ class MainRunner {
   void cycle();
   void stop_drives();
   void print_live() const;
+  [[nodiscard]] std::optional<ReferenceTime> plant_now(FreeRunningTime now);
 
   RunOptions options_;
   platform::EthercatLink link_;
@@ -93,6 +104,7 @@ class MainRunner {
   ethercat::FrameStamps stamps_;  ///< of the last frame
   FreeRunningTime next_line_;
   CycleCsv csv_;
+  std::optional<PlantClock> plant_;
 };
 
 }  // namespace ftcs::daemon

@@ -106,6 +106,21 @@ void print_events(const experiment::CycleFigures& figures) {
   }
 }
 
+const char* name(node::BusMode mode) {
+  if (mode == node::BusMode::kLead) return "lead";
+  return mode == node::BusMode::kExternal ? "external" : "follow";
+}
+
+Json bus_json(const MainRunner& runner) {
+  const BusClockDecision& bus = runner.bus();
+  return {{"mode", name(runner.options().bus_mode)},
+          {"plant_time", runner.options().plant_time},
+          {"state", ftcs::name(bus.state)},
+          {"dc_to_plant_ns", bus.known ? Json(bus.dc_to_plant.ns()) : Json(nullptr)},
+          {"dc_to_plant_sigma_ns", bus.known ? Json(bus.sigma_ns) : Json(nullptr)},
+          {"bus_rate_ppb", bus.rate_ppb}};
+}
+
 std::string describe(const ethercat::Identity& identity) {
   return fmt::format("vendor 0x{:08X}, product 0x{:08X}, revision 0x{:08X}, serial {}",
                      identity.vendor, identity.product, identity.revision, identity.serial);
@@ -258,6 +273,12 @@ void print_run(const MainRunner& runner) {
              figures.worst_difference_ns + 1);
   fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}, doubtful stamps {}\n",
              runner.decision().rate.ppm(), servo.resyncs, servo.impossible, servo.doubtful);
+  if (!runner.options().plant_time.empty()) {
+    fmt::print("bus: {} on {}, {}; dc to plant {:+.3f} us, sigma {:.3f} us; bent by {:+.3f} ppm\n",
+               name(runner.options().bus_mode), runner.options().plant_time,
+               ftcs::name(runner.bus().state), runner.bus().dc_to_plant.ns() * 1e-3,
+               runner.bus().sigma_ns * 1e-3, runner.bus().rate_ppb * 1e-3);
+  }
   if (runner.options().servo.law == CycleLaw::kPics &&
       runner.options().servo.proportional_gain == 1.0 &&
       runner.options().servo.integral_gain == 1.0) {
@@ -303,6 +324,7 @@ Json run_json(const MainRunner& runner) {
             {"histograms", histograms_json(figures)},
             {"events", events_json(figures)},
             {"drives", drives_json(runner)}};
+  if (!runner.options().plant_time.empty()) json["bus"] = bus_json(runner);
   if (runner.main().failure()) json["failure"] = describe(runner.main().failure());
   return json;
 }

@@ -60,6 +60,7 @@ SegmentServer::SegmentServer(const SegmentOptions& options, platform::EthercatLi
   std::stable_sort(options_.faults.begin(), options_.faults.end(),
                    [](const SegmentFault& a, const SegmentFault& b) { return a.at_s < b.at_s; });
   build();
+  if (!options_.clock_csv.empty()) clock_csv_.reset(std::fopen(options_.clock_csv.c_str(), "w"));
 }
 
 void SegmentServer::build() {
@@ -115,11 +116,19 @@ void SegmentServer::serve() {
     return;
   }
   const auto passage = segment_->pass(*frame, on_wire(received->stamp));
+  write_clock(received->stamp);
   if (dropped || !passage.returned) {
     ++dropped_;
     return;
   }
   link_.send(received->frame);
+}
+
+void SegmentServer::write_clock(FreeRunningTime stamp) {
+  constexpr std::uint64_t kEvery = 50;
+  if (!clock_csv_ || frames_ % kEvery != 0 || segment_->size() == 0) return;
+  const std::uint64_t shown = (*segment_)[0].dc().system_time(on_wire(stamp));
+  fmt::print(clock_csv_.get(), "{},{}\n", stamp.since_epoch().rounded_ns(), shown);
 }
 
 void SegmentServer::apply_faults(FreeRunningTime now) {

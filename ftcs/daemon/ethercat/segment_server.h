@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -39,6 +40,8 @@ struct SegmentOptions {
   double duration_s = 0.0;  ///< zero: until a signal
   std::vector<SegmentFault> faults;
   std::string json;
+  /// One line each 50 frames: CLOCK_MONOTONIC and the reference's system time at that instant, ns.
+  std::string clock_csv;
 };
 
 /// Serves a segment of modelled drives on a link until it is told to stop.
@@ -58,6 +61,7 @@ class SegmentServer {
  private:
   [[nodiscard]] bool finished() const;
   void build();
+  void write_clock(FreeRunningTime stamp);
   void apply_faults(FreeRunningTime now);
   void apply(const SegmentFault& fault, ethercat::WireTime now);
 
@@ -73,6 +77,7 @@ class SegmentServer {
   std::uint64_t dropped_ = 0;
   std::uint64_t user_stamps_ = 0;
   std::uint64_t random_ = 0;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> clock_csv_{nullptr, std::fclose};
 };
 
 }  // namespace ftcs::daemon
