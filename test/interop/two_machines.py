@@ -19,10 +19,10 @@ WAYS = (("external", "offset", True), ("lead", "offset", True), ("external", "ta
         ("external", "read-time", False))
 
 
-def clocks(path):
-    """Monotonic time and system time less it, ns."""
+def clocks(path, base):
+    """Monotonic time and system time less it, ns; whole numbers, less a base: a float does not hold them."""
     with open(path) as file:
-        return [(int(a), int(b) - int(a)) for a, b in csv.reader(file)]
+        return [(int(a), int(b) - int(a) - base) for a, b in csv.reader(file)]
 
 
 def at(series, instant, start):
@@ -54,7 +54,8 @@ def run(folder, mode, write):
         segment.terminate()
     for segment in segments:
         segment.wait(timeout=20)
-    first, second = (clocks(os.path.join(folder, f"clock{n}.csv")) for n in range(2))
+    base = clocks(os.path.join(folder, "clock0.csv"), 0)[-1][1]
+    first, second = (clocks(os.path.join(folder, f"clock{n}.csv"), base) for n in range(2))
     begin, end = max(first[0][0], second[0][0]) + SETTLE * 1e9, min(first[-1][0], second[-1][0])
     apart, place = [], 0
     for instant, value in first:
