@@ -237,6 +237,31 @@ TEST_F(RealClockTest, an_expired_leap_second_list_is_said_once) {
   }
 }
 
+// A clock that lost its date stands before a leap second of long ago: the list that tells of it has
+// its offset already, and it is not made again.
+TEST_F(RealClockTest, a_leap_second_from_before_the_list_was_made_is_over) {
+  constexpr std::int64_t kNewYear2017 = 1'483'228'800;
+  constexpr const char* kChanges = "3644697600 36\n3692217600 37\n";
+  for (const bool later : {true, false}) {
+    const std::string made = later ? "#$ 3707596800\n" : "#$ 3676924800\n";  // June 2017, July 2016
+    const auto list = LeapSeconds::parse(made + kChanges, "list");
+    ASSERT_TRUE(list.ok());
+    start(kNewYear2017);
+    leapt = false;
+    kernel.held_names.clear();
+    auto device = ClockDevice::open_system(kernel, ClockAccess::kSteer);
+    UtcConfig utc;
+    utc.leap_seconds = *list;
+    real.reset();
+    real = std::make_unique<RealClock>(kernel, log, KernelClock(std::move(*device)), utc);
+    real->set_reference_scale({});
+    steer();
+    run(40, kNewYear2017);
+    EXPECT_EQ(leapt, !later);
+    EXPECT_EQ(kernel.system.tai, 37);
+  }
+}
+
 TEST_F(RealClockTest, a_device_that_is_gone_ends_the_run) {
   auto device = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kSteer);
   RealClock phc(kernel, log, KernelClock(std::move(*device)), {});

@@ -58,12 +58,14 @@ node::UtcMoment UtcWatch::moment(std::int64_t utc_s) const {
   now.utc_s = utc_s;
   if (!config_.leap_seconds) return now;
   const LeapSeconds& list = *config_.leap_seconds;
-  // The clock that is asked may be the one to be set: it may show anything.
-  const auto state = list.at(std::max(utc_s, list.updated().value_or(utc_s)));
+  // The clock that is asked may be the one to be set: it may show anything. Before the list was
+  // made it cannot be, and a leap second of such a day is over: its offset holds already.
+  const std::int64_t earliest = list.updated().value_or(utc_s);
+  const auto state = list.at(std::max(utc_s, earliest));
   if (!state) return now;
-  const auto today = list.at(utc_s);
-  now.listed = node::ListedUtc{state->utc_offset, today ? today->leap : 0,
-                               list.expires().value_or(utc_s) > utc_s};
+  const bool can_be = utc_s >= earliest;
+  now.listed = node::ListedUtc{state->utc_offset, can_be ? state->leap : 0,
+                               can_be && list.expires().value_or(utc_s) > utc_s};
   return now;
 }
 
