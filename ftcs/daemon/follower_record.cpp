@@ -207,7 +207,7 @@ FollowerRecord::Status FollowerRecord::status(FreeRunningTime now) const {
   Status status = status_;
   if (status.has_sample) status.last_age_s = (now - last_used_).seconds();
   if (locked_since_) status.locked_for_s = (now - *locked_since_).seconds();
-  if (since_lock_.count() > 0) status.since_lock = since_lock_.text();
+  status.since_lock = summary_.since_lock();
   return status;
 }
 
@@ -227,9 +227,7 @@ std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
     return fmt::format("standard output: {}", std::strerror(errno));
   }
   if (!record.offset_known) return std::nullopt;
-  if (record.telemetry.locked && record.telemetry.verdict == SampleVerdict::kUsed) {
-    since_lock_.add(record);
-  }
+  summary_.add(record);
   report_text(record, sync_interval);
   return std::nullopt;
 }
@@ -241,10 +239,9 @@ void FollowerRecord::report_text(const SampleRecord& record,
     log_(LogLevel::kInfo, "{}", ptp4l_line(record));
     return;
   }
-  recent_.add(record);
-  if (recent_.count() < per_summary) return;
-  log_(LogLevel::kInfo, "{}", recent_.text());
-  recent_.reset();
+  if (const auto text = summary_.add_recent(record, per_summary)) {
+    log_(LogLevel::kInfo, "{}", *text);
+  }
 }
 
 // As ptp4l: 2^(summary_interval - logSyncInterval) samples.
@@ -256,12 +253,7 @@ std::uint64_t FollowerRecord::samples_per_summary(std::optional<Duration> sync_i
 
 void FollowerRecord::log_summary() {
   state_.save();
-  const DisciplineCounters& counters = discipline_.counters();
-  log_(LogLevel::kNotice, "summary: {}, {} samples used, {} rejected, {} steps",
-       locked() ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
-  if (since_lock_.count() > 0) {
-    log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
-  }
+  summary_.log(log_, discipline_.counters(), locked(), "samples");
 }
 
 }  // namespace ftcs::daemon

@@ -9,6 +9,7 @@
 #include "ftcs/daemon/kept_state.h"
 #include "ftcs/daemon/log.h"
 #include "ftcs/daemon/ptp_options.h"
+#include "ftcs/daemon/run_summary.h"
 #include "ftcs/daemon/sample_report.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/node/clock_follower.h"
@@ -35,7 +36,7 @@ class FollowerRecord {
 
   [[nodiscard]] bool locked() const { return discipline_.locked(); }
   /// Of all used samples since the first lock.
-  [[nodiscard]] double offset_rms_ns() const { return since_lock_.offset_rms(); }
+  [[nodiscard]] double offset_rms_ns() const { return summary_.offset_rms_ns(); }
   [[nodiscard]] const ClockDiscipline& discipline() const { return discipline_; }
 
   /// A message that did not steer, and why.
@@ -72,8 +73,7 @@ class FollowerRecord {
   const ClockDiscipline& discipline_;
   FreeRunningTime start_;
   std::string label_;
-  SampleSummary recent_;
-  SampleSummary since_lock_;
+  RunSummary summary_;
   Status status_;
   FreeRunningTime last_used_{};
   std::optional<FreeRunningTime> locked_since_{};

@@ -9,12 +9,12 @@
 #include "ftcs/daemon/status_report.h"
 
 namespace ftcs::daemon {
-namespace {
 
-node::ReceiverNodeConfig node_config(const PtpOptions& options, const PortFacts& facts,
-                                     const StateKeeper& state, std::uint64_t seed) {
+node::ReceiverNodeConfig receiver_node_config(const PtpOptions& options, const PortFacts& facts,
+                                              const std::optional<LearntState>& learnt,
+                                              std::uint64_t seed) {
   node::ReceiverNodeConfig node;
-  node.follower = follower_config(options, facts.hardware_stamps, state.learnt());
+  node.follower = follower_config(options, facts.hardware_stamps, learnt);
   ptp::TimeReceiverConfig& config = node.port;
   config.port = facts.identity;
   config.domain = options.domain;
@@ -36,15 +36,13 @@ node::ReceiverNodeConfig node_config(const PtpOptions& options, const PortFacts&
   return node;
 }
 
-}  // namespace
-
 PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
                          std::unique_ptr<platform::TimestampClock> timestamps,
                          const PortFacts& facts, RealClock* real_clock)
     : PtpPort(kernel, options, log, std::move(timestamps), real_clock),
       state_(state_keeper(this->options(), log, facts.hardware_stamps)),
-      node_(node_config(this->options(), facts, state_,
-                        static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW))),
+      node_(receiver_node_config(this->options(), facts, state_.learnt(),
+                                 static_cast<std::uint64_t>(kernel.clock_ns(CLOCK_MONOTONIC_RAW))),
             clock(), gate()),
       record_(this->options(), log, state_, node_.discipline(), now(),
               "port 1 (" + options.interface + ")"),

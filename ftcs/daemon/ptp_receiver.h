@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "ftcs/daemon/follower_record.h"
 #include "ftcs/daemon/ptp_port.h"
 #include "ftcs/node/receiver_node.h"
 
 namespace ftcs::daemon {
+
+/// The node that the options ask for. `seed`: of the Delay_Req intervals.
+[[nodiscard]] node::ReceiverNodeConfig receiver_node_config(
+    const PtpOptions& options, const PortFacts& facts, const std::optional<LearntState>& learnt,
+    std::uint64_t seed);
 
 /// A clock, virtual or real, that follows a PTP time transmitter: a node::ReceiverNode between
 /// sockets and log.

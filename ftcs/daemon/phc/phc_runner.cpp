@@ -18,8 +18,9 @@ using platform::ClockDevice;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
-DisciplineConfig discipline_config(const PhcOptions& options, bool exact) {
-  DisciplineConfig config;
+node::ClockFollowerConfig follower_config(const PhcOptions& options, bool exact) {
+  node::ClockFollowerConfig follower;
+  DisciplineConfig& config = follower.discipline;
   config.servo = options.servo;
   config.largest_rate_change = options.steering.largest_rate_change;
   config.servo.sync_interval =
@@ -32,7 +33,7 @@ DisciplineConfig discipline_config(const PhcOptions& options, bool exact) {
   } else if (options.first_step_threshold > Nanoseconds{0}) {
     config.step = {StepMode::kFirst, options.first_step_threshold};
   }
-  return config;
+  return follower;
 }
 
 Result<UtcConfig, std::string> utc_config(const PhcOptions& options) {
@@ -85,7 +86,7 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       source_(std::move(clocks.source)),
       sink_(std::move(clocks.sink)),
       comparison_(std::move(clocks.comparison)),
-      discipline_(discipline_config(options, comparison_.is_exact()), sink_->clock()) {
+      follower_(follower_config(options, comparison_.is_exact()), sink_->clock()) {
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
   if (options.sink_ahead_s) {
     const int ahead_of_utc = sink_->is_system() ? -*options.sink_ahead_s : UtcConfig{}.utc_offset;
@@ -118,7 +119,7 @@ void PhcRunner::set_scale() {
 
 // Before the next sample, which would be seconds off. The clock is never stepped for it.
 void PhcRunner::follow_scale_change() {
-  if (sink_->take_scale_change()) discipline_.on_new_reference();
+  if (sink_->take_scale_change()) follower_.on_new_reference();
 }
 
 // A port that transmits follows nobody: its adapter's clock may show anything, unless the system
@@ -146,7 +147,7 @@ bool PhcRunner::may_follow() {
        may           ? "following"
        : port_moved_ ? "another clock is to follow now"
                      : "keeping the last rate");
-  if (may && discipline_.counters().commands > 0) discipline_.on_new_reference();
+  if (may && discipline().counters().commands > 0) follower_.on_new_reference();
   return may;
 }
 
@@ -170,11 +171,11 @@ int PhcRunner::run() {
       if (may) {
         take_sample();
       } else {
-        (void)discipline_.on_silence();
+        on_silence();
       }
     }
-    const auto wrong = sink_->attend(discipline_.counters().commands > 0, discipline_.locked(),
-                                     discipline_.latest().servo);
+    const auto wrong = sink_->attend(discipline().counters().commands > 0, discipline().locked(),
+                                     discipline().latest().servo);
     if (wrong) fail(*wrong);
     follow_scale_change();
   }
@@ -214,58 +215,69 @@ void PhcRunner::take_sample() {
     if (error.kind == platform::OsErrorKind::kNoSuchDevice) return fail(error.message());
     if (!reading_failed_) log_(LogLevel::kWarning, "{}", error.message());
     reading_failed_ = true;
-    (void)discipline_.on_silence();
+    on_silence();
     return;
   }
   reading_failed_ = false;
   const auto instant = sink_->clock().from_stamp(comparison->sink_ns);
   if (!instant) return;  // somebody has just stepped the clock
   if (!sink_->admits(ReferenceTime::from_ns(comparison->source_ns), *instant)) {
-    (void)discipline_.on_silence();
+    on_silence();
     return;
   }
   // As it was read, before the servo acts on it.
   const Duration offset = offset_from_reference(sink_->clock().local_of(comparison->sink_ns),
                                                 ReferenceTime::from_ns(comparison->source_ns));
-  const std::uint64_t steps = discipline_.counters().steps;
+  const std::uint64_t steps = discipline().counters().steps;
   if (!comparison_.is_exact()) feed(Direction::kBackward, *comparison, *instant);
   feed(Direction::kForward, *comparison, *instant);
-  if (!failure_) report(offset, comparison->delay_ns, discipline_.counters().steps > steps);
+  if (!failure_) report(offset, comparison->delay_ns, discipline().counters().steps > steps);
 }
 
 void PhcRunner::feed(Direction direction, const Comparison& comparison, FreeRunningTime instant) {
   const Duration half = Duration::from_whole_ns(comparison.delay_ns).half();
   const auto source = ReferenceTime::from_ns(comparison.source_ns);
-  const Telemetry telemetry = discipline_.on_pair(
-      {direction, direction == Direction::kForward ? source - half : source + half, instant});
-  if (telemetry.error) {
-    const std::string text = describe(sink_->name(), *telemetry.error);
-    if (*telemetry.error == ClockError::kBusy || *telemetry.error == ClockError::kRateOutOfLimits) {
-      if (!clock_refuses_) log_(LogLevel::kWarning, "{}", text);
-    } else {
+  follower_.on_pair(
+      {direction, direction == Direction::kForward ? source - half : source + half, instant},
+      std::nullopt);
+  take_notes();
+}
+
+void PhcRunner::on_silence() {
+  follower_.on_silence();
+  take_notes();
+}
+
+// Samples are reported by the reading, whose two messages are one.
+void PhcRunner::take_notes() {
+  while (const auto event = follower_.next()) {
+    const auto* note = std::get_if<node::Note>(&*event);
+    if (note == nullptr || note->kind != node::NoteKind::kClockRefused) continue;
+    const std::string text = describe(sink_->name(), note->error);
+    if (node::is_lasting(note->error)) {
       fail(text);
+    } else {
+      log_(LogLevel::kWarning, "{}", text);
     }
   }
-  clock_refuses_ = telemetry.error.has_value();
 }
 
 void PhcRunner::report(Duration offset, std::int64_t delay_ns, bool stepped) {
   SampleRecord record;
-  record.telemetry = discipline_.latest();
+  record.telemetry = discipline().latest();
   record.offset = offset;  // as it was seen, whatever the servo made of it
   record.telemetry.servo.path_delay = Duration::from_whole_ns(delay_ns);
   if (stepped) record.telemetry.servo.state = ServoState::kJump;
   const bool used = record.telemetry.verdict == SampleVerdict::kUsed;
-  if (used && record.telemetry.locked) since_lock_.add(record);
+  summary_.add(record);
   if (options_.samples_per_summary < 2 || !used) {
     log_(LogLevel::kInfo, "{}",
          phc2sys_line(record, sink_->name(), source_.is_system() ? "sys" : "phc"));
     return;
   }
-  recent_.add(record);
-  if (recent_.count() < options_.samples_per_summary) return;
-  log_(LogLevel::kInfo, "{} {}", sink_->name(), recent_.text());
-  recent_.reset();
+  if (const auto text = summary_.add_recent(record, options_.samples_per_summary)) {
+    log_(LogLevel::kInfo, "{} {}", sink_->name(), *text);
+  }
 }
 
 void PhcRunner::fail(const std::string& reason) {
@@ -273,13 +285,8 @@ void PhcRunner::fail(const std::string& reason) {
 }
 
 int PhcRunner::finish() {
-  const DisciplineCounters& counters = discipline_.counters();
-  const bool locked = discipline_.locked();
-  log_(LogLevel::kNotice, "summary: {}, {} readings used, {} rejected, {} steps",
-       locked ? "locked" : "not locked", counters.used, counters.rejected, counters.steps);
-  if (since_lock_.count() > 0) {
-    log_(LogLevel::kNotice, "summary while locked: {}", since_lock_.text());
-  }
+  const bool locked = discipline().locked();
+  summary_.log(log_, discipline().counters(), locked, "readings");
   return locked ? kSuccess : kNotLocked;
 }
 

@@ -10,8 +10,8 @@
 #include "ftcs/daemon/phc/phc_options.h"
 #include "ftcs/daemon/phc/port_watch.h"
 #include "ftcs/daemon/real_clock.h"
-#include "ftcs/daemon/sample_report.h"
-#include "ftcs/discipline/clock_discipline.h"
+#include "ftcs/daemon/run_summary.h"
+#include "ftcs/node/clock_follower.h"
 #include "ftcs/platform/clock_device.h"
 
 namespace ftcs::daemon {
@@ -38,7 +38,7 @@ class PhcRunner {
   [[nodiscard]] int run();
   /// After a run that ended because the port asks for another pairing; otherwise no value.
   [[nodiscard]] std::optional<PortWatch> take_moved_port();
-  [[nodiscard]] bool has_steered() const { return discipline_.counters().commands > 0; }
+  [[nodiscard]] bool has_steered() const { return discipline().counters().commands > 0; }
 
  private:
   struct Clocks {
@@ -54,6 +54,9 @@ class PhcRunner {
   [[nodiscard]] bool port_is_usable() const;
   void set_scale();
   void schedule_next();
+  [[nodiscard]] const ClockDiscipline& discipline() const { return follower_.discipline(); }
+  void on_silence();
+  void take_notes();
   void take_sample();
   void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
   void report(Duration offset, std::int64_t delay_ns, bool stepped);
@@ -66,17 +69,15 @@ class PhcRunner {
   platform::ClockDevice source_;
   std::unique_ptr<RealClock> sink_;
   ClockComparison comparison_;
-  ClockDiscipline discipline_;
+  node::ClockFollower follower_;
   std::optional<PortWatch> watch_;
   std::optional<Pairing> pairing_;
   bool port_moved_ = false;
   bool following_ = true;
   std::uint64_t scales_heard_ = 0;
-  SampleSummary recent_;
-  SampleSummary since_lock_;
+  RunSummary summary_;
   std::int64_t next_raw_ns_ = 0;
   bool reading_failed_ = false;
-  bool clock_refuses_ = false;
   std::optional<std::string> failure_;
 };
 
