@@ -116,6 +116,12 @@ Wrong apply_peer(const PtpArguments& arguments, daemon::PtpOptions& options) {
 }
 
 Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
+  // Who only receives time by multicast is asked nothing: messages to its own address come from
+  // whoever can route a packet here.
+  if (options.role == daemon::Role::kTimeReceiver) {
+    options.socket.unicast_messages = options.hybrid ? platform::UnicastMessages::kDelayAnswers
+                                                     : platform::UnicastMessages::kNone;
+  }
   for (const std::string& text : arguments.acceptable) {
     const auto identity = parse_clock_identity(text);
     if (!identity) {

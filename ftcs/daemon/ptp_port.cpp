@@ -154,6 +154,8 @@ void PtpPort::log_unusual(const ptp::Counters& counters) {
     add("receive_stamp_missing", socket->counters().receive_stamp_missing);
     add("transmit_stamp_late", socket->counters().transmit_stamp_late);
     add("oversized_datagrams", socket->counters().oversized);
+    add("unicast_dropped", socket->counters().unicast_dropped);
+    add("stranger_dropped", socket->counters().stranger_dropped);
   }
   add("foreign_steps", timestamps_->foreign_steps());
   if (!text.empty()) log_(LogLevel::kNotice, "counted besides: {}", text);

@@ -28,6 +28,8 @@ class FakeKernel : public Kernel {
     std::vector<std::uint8_t> bytes;
     std::int64_t software_ns = 0;  ///< 0: the kernel gave no such stamp
     std::int64_t hardware_ns = 0;
+    SocketAddress sender{};
+    std::optional<in_addr> destination{};  ///< told with the message, as IP_PKTINFO asks for
   };
   struct Socket {
     std::deque<Packet> received;
@@ -132,7 +134,10 @@ class FakeKernel : public Kernel {
     const std::size_t length = std::min(packet.bytes.size(), message.msg_iov[0].iov_len);
     std::memcpy(message.msg_iov[0].iov_base, packet.bytes.data(), length);
     message.msg_flags = length < packet.bytes.size() ? MSG_TRUNC : 0;
-    write_stamps(packet, message);
+    if (message.msg_name != nullptr && packet.sender.size() > 0) {
+      std::memcpy(message.msg_name, packet.sender.get(), packet.sender.size());
+    }
+    write_control(packet, message);
     return static_cast<ssize_t>(length);
   }
   int control(int, unsigned long request, void* argument) noexcept override {
@@ -192,20 +197,32 @@ class FakeKernel : public Kernel {
   std::int64_t device_number(int) noexcept override { return 0; }
 
  private:
-  static void write_stamps(const Packet& packet, msghdr& message) {
-    if (packet.software_ns == 0 && packet.hardware_ns == 0) {
-      message.msg_controllen = 0;
-      return;
+  static void write_control(const Packet& packet, msghdr& message) {
+    std::size_t size = 0;
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    if (packet.software_ns != 0 || packet.hardware_ns != 0) {
+      write_stamps(packet, header);
+      size += CMSG_SPACE(sizeof(scm_timestamping));
+      header = CMSG_NXTHDR(&message, header);
     }
+    if (packet.destination) {
+      const in_pktinfo info{2, {}, *packet.destination};
+      header->cmsg_level = IPPROTO_IP;
+      header->cmsg_type = IP_PKTINFO;
+      header->cmsg_len = CMSG_LEN(sizeof info);
+      std::memcpy(CMSG_DATA(header), &info, sizeof info);
+      size += CMSG_SPACE(sizeof info);
+    }
+    message.msg_controllen = size;
+  }
+  static void write_stamps(const Packet& packet, cmsghdr* header) {
     scm_timestamping stamps{};
     stamps.ts[0] = {packet.software_ns / 1'000'000'000, packet.software_ns % 1'000'000'000};
     stamps.ts[2] = {packet.hardware_ns / 1'000'000'000, packet.hardware_ns % 1'000'000'000};
-    cmsghdr* header = CMSG_FIRSTHDR(&message);
     header->cmsg_level = SOL_SOCKET;
     header->cmsg_type = SCM_TIMESTAMPING;
     header->cmsg_len = CMSG_LEN(sizeof stamps);
     std::memcpy(CMSG_DATA(header), &stamps, sizeof stamps);
-    message.msg_controllen = CMSG_SPACE(sizeof stamps);
   }
 
   int next_descriptor_ = 10;

@@ -14,6 +14,7 @@ namespace {
 constexpr std::uint16_t kEthertype = 0x88F7;               // Annex E
 constexpr std::uint32_t kPrimaryMulticast = 0xE0000181;    // 224.0.1.129, Annex C.3
 constexpr std::uint32_t kPeerDelayMulticast = 0xE000006B;  // 224.0.0.107, Annex C.3
+constexpr int kTold = 1;  // with each message: the address that it was sent to
 constexpr std::array kGroups{Group::kPrimary, Group::kPeerDelay};
 
 struct Option {
@@ -72,7 +73,8 @@ std::optional<OsError> join_ipv4(Kernel& kernel, int fd, const PtpEndpointConfig
   const std::array options{Option{IP_MULTICAST_IF, &outgoing, sizeof outgoing},
                            Option{IP_MULTICAST_LOOP, &loop, sizeof loop},
                            Option{IP_MULTICAST_ALL, &only_joined, sizeof only_joined},
-                           Option{IP_MULTICAST_TTL, &config.ttl, sizeof config.ttl}};
+                           Option{IP_MULTICAST_TTL, &config.ttl, sizeof config.ttl},
+                           Option{IP_PKTINFO, &kTold, sizeof kTold}};
   return set_all(kernel, fd, IPPROTO_IP, options, what);
 }
 
@@ -89,7 +91,8 @@ std::optional<OsError> join_ipv6(Kernel& kernel, int fd, const PtpEndpointConfig
   const int loop = interface.loopback ? 1 : 0;
   const std::array options{Option{IPV6_MULTICAST_IF, &interface.index, sizeof interface.index},
                            Option{IPV6_MULTICAST_LOOP, &loop, sizeof loop},
-                           Option{IPV6_MULTICAST_HOPS, &config.ttl, sizeof config.ttl}};
+                           Option{IPV6_MULTICAST_HOPS, &config.ttl, sizeof config.ttl},
+                           Option{IPV6_RECVPKTINFO, &kTold, sizeof kTold}};
   return set_all(kernel, fd, IPPROTO_IPV6, options, what);
 }
 

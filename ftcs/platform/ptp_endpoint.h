@@ -28,6 +28,14 @@ enum class Group : std::uint8_t {
   kPeerDelay,  ///< never forwarded by a bridge or router
 };
 
+/// What may come to an address of our own, instead of a group's. Whoever can route a packet to this
+/// host can send such messages; a group's do not leave its network.
+enum class UnicastMessages : std::uint8_t {
+  kAll,           ///< of a transmitter, which is asked so, and with a configured peer
+  kDelayAnswers,  ///< Delay_Resp alone: hybrid end-to-end
+  kNone,
+};
+
 struct PtpEndpointConfig {
   std::string interface;
   NetworkTransport transport = NetworkTransport::kUdpIpv4;
@@ -37,8 +45,9 @@ struct PtpEndpointConfig {
   std::uint8_t ipv6_scope = 0xE;  ///< X of ff0X::181 (ptp4l: udp6_scope); 0xE = global
   MacAddress primary_mac{0x01, 0x1B, 0x19, 0x00, 0x00, 0x00};  ///< ptp4l: ptp_dst_mac
   MacAddress peer_mac{0x01, 0x80, 0xC2, 0x00, 0x00, 0x0E};     ///< ptp4l: p2p_dst_mac
-  /// The only peer, instead of multicast. Its port does not matter.
+  /// The only peer, instead of multicast: nobody else is heard. Its port does not matter.
   std::optional<SocketAddress> unicast{};
+  UnicastMessages unicast_messages = UnicastMessages::kAll;  ///< without `unicast`
 };
 
 /// Opens one of a port's two sockets: not blocking, bound, member of both groups. Over IEEE 802.3

@@ -2,9 +2,11 @@
 #include "ftcs/platform/ptp_socket.h"
 
 #include <algorithm>
+#include <arpa/inet.h>
 #include <cerrno>
 #include <cstring>
 #include <linux/errqueue.h>
+#include <linux/if_packet.h>
 #include <linux/net_tstamp.h>
 #include <utility>
 
@@ -19,8 +21,33 @@ struct Datagram {
   ssize_t size = 0;  // negative: -errno
   bool truncated = false;
   SocketAddress sender{};
+  bool to_group = true;  // or nobody said
   KernelStamps stamps{};
 };
+
+void take(const cmsghdr& header, const unsigned char* data, Datagram& datagram) {
+  if (header.cmsg_level == SOL_SOCKET && header.cmsg_type == SCM_TIMESTAMPING) {
+    scm_timestamping stamps{};
+    std::memcpy(&stamps, data, sizeof stamps);
+    const auto nanoseconds = [](const auto& t) { return t.tv_sec * 1'000'000'000 + t.tv_nsec; };
+    datagram.stamps = {nanoseconds(stamps.ts[0]), nanoseconds(stamps.ts[2])};
+  } else if (header.cmsg_level == IPPROTO_IP && header.cmsg_type == IP_PKTINFO) {
+    in_pktinfo info{};
+    std::memcpy(&info, data, sizeof info);
+    datagram.to_group = IN_MULTICAST(ntohl(info.ipi_addr.s_addr));
+  } else if (header.cmsg_level == IPPROTO_IPV6 && header.cmsg_type == IPV6_PKTINFO) {
+    in6_pktinfo info{};
+    std::memcpy(&info, data, sizeof info);
+    datagram.to_group = info.ipi6_addr.s6_addr[0] == 0xFF;
+  }
+}
+
+bool is_packet_to_us(const sockaddr_storage& sender) {
+  if (sender.ss_family != AF_PACKET) return false;
+  sockaddr_ll link{};
+  std::memcpy(&link, &sender, sizeof link);
+  return link.sll_pkttype == PACKET_HOST;
+}
 
 Datagram receive_datagram(Kernel& kernel, int fd, std::span<std::uint8_t> buffer, int flags) {
   // Room for the stamps, the extended error of the error queue and its address.
@@ -39,14 +66,11 @@ Datagram receive_datagram(Kernel& kernel, int fd, std::span<std::uint8_t> buffer
   datagram.size = kernel.receive(fd, message, flags);
   if (datagram.size < 0) return datagram;
   datagram.sender = SocketAddress::from(sender);
+  datagram.to_group = !is_packet_to_us(sender);
   datagram.truncated = (message.msg_flags & MSG_TRUNC) != 0;
   for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr;
        header = CMSG_NXTHDR(&message, header)) {
-    if (header->cmsg_level != SOL_SOCKET || header->cmsg_type != SCM_TIMESTAMPING) continue;
-    scm_timestamping stamps{};
-    std::memcpy(&stamps, CMSG_DATA(header), sizeof stamps);
-    const auto nanoseconds = [](const auto& t) { return t.tv_sec * 1'000'000'000 + t.tv_nsec; };
-    datagram.stamps = {nanoseconds(stamps.ts[0]), nanoseconds(stamps.ts[2])};
+    take(*header, CMSG_DATA(header), datagram);
   }
   return datagram;
 }
@@ -148,6 +172,10 @@ Result<std::optional<ReceivedMessage>, OsError> PtpSocket::receive(Channel chann
     ++counters_.oversized;
     return std::optional<ReceivedMessage>{};
   }
+  if (!admits(datagram.sender, datagram.to_group,
+              {buffer_.data(), static_cast<std::size_t>(datagram.size)})) {
+    return std::optional<ReceivedMessage>{};
+  }
   ++counters_.received;
   ReceivedMessage message;
   message.channel = channel;
@@ -162,6 +190,22 @@ Result<std::optional<ReceivedMessage>, OsError> PtpSocket::receive(Channel chann
     }
   }
   return std::optional<ReceivedMessage>{message};
+}
+
+bool PtpSocket::admits(const SocketAddress& sender, bool to_group,
+                       std::span<const std::uint8_t> bytes) noexcept {
+  if (config_.unicast) {
+    const bool known = sender.is_same_host(*config_.unicast);
+    if (!known) ++counters_.stranger_dropped;
+    return known;
+  }
+  constexpr unsigned kDelayResp = 9;  // messageType, IEEE 1588-2019 table 36
+  const bool answer = !bytes.empty() && (bytes[0] & 0xFU) == kDelayResp;
+  const bool may = config_.unicast_messages == UnicastMessages::kAll ||
+                   (answer && config_.unicast_messages == UnicastMessages::kDelayAnswers);
+  if (to_group || may) return true;
+  ++counters_.unicast_dropped;
+  return false;
 }
 
 std::optional<TransmittedMessage> PtpSocket::receive_transmitted() {

@@ -44,6 +44,8 @@ struct SocketCounters {
   std::uint64_t received = 0;
   std::uint64_t sent = 0;
   std::uint64_t oversized = 0;               ///< longer than any PTP message: dropped
+  std::uint64_t unicast_dropped = 0;         ///< sent to us instead of the group (UnicastMessages)
+  std::uint64_t stranger_dropped = 0;        ///< not from the configured peer
   std::uint64_t receive_stamp_missing = 0;   ///< event messages without a usable kernel stamp
   std::uint64_t transmit_stamp_missing = 0;  ///< not within tx_timestamp_timeout
   std::uint64_t transmit_stamp_late =
@@ -95,6 +97,9 @@ class PtpSocket {
       : kernel_(&kernel), config_(std::move(config)), clock_(&clock) {}
 
   [[nodiscard]] std::optional<OsError> open_channel(Channel channel);
+  /// Whether a message may be heard; if not, it is counted.
+  [[nodiscard]] bool admits(const SocketAddress& sender, bool to_group,
+                            std::span<const std::uint8_t> bytes) noexcept;
   [[nodiscard]] std::optional<OsError> transmit(Channel channel,
                                                 std::span<const std::uint8_t> bytes,
                                                 const SocketAddress& to);

@@ -5,7 +5,10 @@
 
 #include <arpa/inet.h>
 #include <chrono>
+#include <cstring>
+#include <linux/if_packet.h>
 #include <memory>
+#include <string>
 #include <unistd.h>
 #include <vector>
 
@@ -97,6 +100,77 @@ TEST(PtpSocket, takes_the_best_stamps_there_are_and_says_which) {
   none.kernel.timestamping_errno = EINVAL;
   EXPECT_EQ(none.open()->receive_stamps(), StampSource::kUserSpace);
   EXPECT_FALSE(none.open(TimestampMode::kSoftware).ok());
+}
+
+// Any host that can route a packet to us was a transmitter.
+TEST(PtpSocket, messages_to_an_address_of_our_own_are_heard_only_if_that_is_configured) {
+  struct Case {
+    UnicastMessages configured;
+    bool sync, answer;
+  };
+  for (const Case& expected :
+       {Case{UnicastMessages::kAll, true, true}, Case{UnicastMessages::kDelayAnswers, false, true},
+        Case{UnicastMessages::kNone, false, false}}) {
+    Bench bench;
+    bench.config.unicast_messages = expected.configured;
+    auto socket = bench.open();
+    ASSERT_TRUE(socket.ok());
+    const auto hears = [&](std::uint8_t type, const char* to) {
+      Bytes bytes = message(1);
+      bytes[0] = type;
+      const Channel channel = type < 8 ? Channel::kEvent : Channel::kGeneral;
+      FakeKernel::Packet packet{bytes, bench.kernel.realtime_ns, 0};
+      packet.destination = in_addr{::inet_addr(to)};
+      bench.kernel.sockets[socket->descriptor(channel)].received.push_back(packet);
+      const auto received = socket->receive(channel);
+      return received.ok() && received->has_value();
+    };
+    EXPECT_TRUE(hears(0, "224.0.1.129"));
+    EXPECT_TRUE(hears(2, "224.0.0.107"));
+    EXPECT_EQ(hears(0, "10.77.0.2"), expected.sync);
+    EXPECT_EQ(hears(11, "10.77.0.2"), expected.sync);
+    EXPECT_EQ(hears(9, "10.77.0.2"), expected.answer);
+    EXPECT_EQ(socket->counters().unicast_dropped,
+              (expected.sync ? 0U : 2U) + (expected.answer ? 0U : 1U));
+  }
+}
+
+TEST(PtpSocket, ethernet_frames_to_our_own_address_are_dropped_alike) {
+  Bench bench;
+  bench.config.transport = NetworkTransport::kEthernet;
+  bench.config.unicast_messages = UnicastMessages::kNone;
+  auto socket = bench.open();
+  ASSERT_TRUE(socket.ok());
+  for (const bool to_us : {true, false}) {
+    sockaddr_storage storage{};
+    sockaddr_ll link{};
+    link.sll_family = AF_PACKET;
+    link.sll_pkttype = to_us ? PACKET_HOST : PACKET_MULTICAST;
+    std::memcpy(&storage, &link, sizeof link);
+    bench.kernel.sockets[socket->descriptor(Channel::kEvent)].received.push_back(
+        {message(1), bench.kernel.realtime_ns, 0, SocketAddress::from(storage), {}});
+    const auto received = socket->receive(Channel::kEvent);
+    EXPECT_EQ(received.ok() && received->has_value(), !to_us);
+  }
+  EXPECT_EQ(socket->counters().unicast_dropped, 1U);
+}
+
+TEST(PtpSocket, a_configured_peer_is_the_only_one_that_is_heard) {
+  Bench bench;
+  bench.config.unicast = SocketAddress::ipv4({::inet_addr("10.77.0.1")}, 0);
+  auto socket = bench.open();
+  ASSERT_TRUE(socket.ok());
+  for (const char* from : {"10.77.0.1", "10.77.0.3"}) {
+    bench.kernel.sockets[socket->descriptor(Channel::kEvent)].received.push_back(
+        {message(1),
+         bench.kernel.realtime_ns,
+         0,
+         SocketAddress::ipv4({::inet_addr(from)}, 319),
+         {}});
+    const auto received = socket->receive(Channel::kEvent);
+    EXPECT_EQ(received.ok() && received->has_value(), from == std::string("10.77.0.1"));
+  }
+  EXPECT_EQ(socket->counters().stranger_dropped, 1U);
 }
 
 TEST(PtpSocket, hardware_stamps_are_passed_on_as_they_are) {

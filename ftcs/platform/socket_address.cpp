@@ -110,6 +110,26 @@ SocketAddress SocketAddress::on_interface(int index) const noexcept {
   return *this;
 }
 
+bool SocketAddress::is_same_host(const SocketAddress& other) const noexcept {
+  if (family() != other.family()) return false;
+  switch (family()) {
+    case AF_INET:
+      return as<sockaddr_in>().sin_addr.s_addr == other.as<sockaddr_in>().sin_addr.s_addr;
+    case AF_INET6: {
+      const auto ours = as<sockaddr_in6>();
+      const auto theirs = other.as<sockaddr_in6>();
+      return std::memcmp(&ours.sin6_addr, &theirs.sin6_addr, sizeof ours.sin6_addr) == 0;
+    }
+    case AF_PACKET: {
+      const auto ours = as<sockaddr_ll>();
+      const auto theirs = other.as<sockaddr_ll>();
+      return std::memcmp(ours.sll_addr, theirs.sll_addr, sizeof(MacAddress)) == 0;
+    }
+    default:
+      return false;
+  }
+}
+
 std::string SocketAddress::host() const {
   char text[INET6_ADDRSTRLEN] = "";
   if (family() == AF_INET) {

@@ -38,6 +38,8 @@ class SocketAddress {
   [[nodiscard]] SocketAddress with_port(std::uint16_t port) const noexcept;
   /// The same address on the interface with this index, where the family needs to be told.
   [[nodiscard]] SocketAddress on_interface(int index) const noexcept;
+  /// The same address, whatever the port and the interface.
+  [[nodiscard]] bool is_same_host(const SocketAddress& other) const noexcept;
   /// "10.77.0.1", "ff0e::181", "01-1b-19-00-00-00".
   [[nodiscard]] std::string host() const;
 
