@@ -225,11 +225,12 @@ static int32_t config_error(const ftcs_addend_config* c) {
 
 int32_t ftcs_addend_init(ftcs_addend_servo* servo, const ftcs_addend_config* config,
                          uint32_t addend_now) {
-  static const ftcs_addend_servo empty;
+  uint8_t* const bytes = (uint8_t*)servo;
+  uint32_t i;
   const int32_t error = config_error(config);
   if (error == FTCS_ADDEND_OK) {
     const uint32_t limit = part_per_million(config->nominal_addend, config->limit_ppm);
-    *servo = empty;
+    for (i = 0; i < sizeof *servo; ++i) bytes[i] = 0;
     servo->config = config;
     servo->slowest = config->nominal_addend - limit;
     servo->fastest = config->nominal_addend + limit;
@@ -446,6 +447,10 @@ static void steer(ftcs_addend_servo* s, const ftcs_addend_sample* in, const prog
   if (s->phase != FTCS_ACTING && c->step_ns > 0 &&
       magnitude(offset) >= (uint64_t)c->step_ns * 65536U) {
     out->step_ns = -(offset / 65536);
+    if (magnitude(offset) >= (uint64_t)FTCS_LONGEST / 2U) { /* a clock that starts in 1970 */
+      const uint64_t back = (uint64_t)in->origin_ns - (uint64_t)in->local_ns;
+      out->step_ns = (int64_t)back;
+    }
     start_ns = shifted_ns(start_ns, out->step_ns);
     s->local_ns = shifted_ns(s->local_ns, out->step_ns);
   } else {

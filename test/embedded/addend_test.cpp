@@ -140,6 +140,17 @@ TEST(AddendServo, steps_once_at_the_start_if_it_may_and_never_if_it_may_not) {
   }
 }
 
+TEST(AddendServo, steps_a_clock_that_starts_in_1970) {
+  Plant plant(kInterval, 50'000.0, 1'000'000 - Plant::kEpoch, 0.0);
+  ftcs_addend_config config = plain();
+  config.step_ns = 1'000'000;
+  Node node(config);
+  node.run(plant, 3);
+  EXPECT_LT(std::abs(plant.true_offset_ns()), 100'000.0);
+  EXPECT_EQ(node.step(plant).step_ns, 0);
+  EXPECT_LT(std::abs(plant.true_offset_ns()), 100.0);
+}
+
 TEST(AddendServo, goes_on_when_somebody_else_stepped_the_clock_and_said_so) {
   Plant plant(kInterval, 50'000.0, 1'000'000, 0.0);
   Node node(plain());

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+// A whole node on a bare-metal Cortex-M with an emulated Ethernet (MPS2: SMSC LAN9118): the
+// sans-I/O PTP receiver over IEEE 802.3 and ftcs_addend, with an addend clock in software on the
+// processor's timer. Ends with 0 when it is locked. Stamps are taken when a frame is polled: the
+// emulation's scheduling is their noise.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <variant>
+
+#include "board.h"
+#include "ftcs/ptp/time_receiver.h"
+#include "ftcs_addend.h"
+#include "lan9118.h"
+
+void operator delete(void*) noexcept {}
+void operator delete(void*, std::size_t) noexcept {}
+
+namespace {
+using namespace ftcs;
+
+constexpr std::uint32_t kNominal = 1U << 31;
+constexpr std::uint32_t kLockNs = 5'000'000;
+
+// SysTick, 24 bits at 25 MHz, made 64 bits by whoever asks at least twice a second.
+class Timer {
+ public:
+  Timer() {
+    systick()[1] = 0xFFFFFFU;
+    systick()[2] = 0;
+    systick()[0] = 5;
+    last_ = systick()[2];
+  }
+  [[nodiscard]] std::int64_t ns() {
+    const std::uint32_t count = systick()[2];
+    ticks_ += (last_ - count) & 0xFFFFFFU;
+    last_ = count;
+    return ticks_ * 40;
+  }
+
+ private:
+  static volatile std::uint32_t* systick() {
+    return reinterpret_cast<volatile std::uint32_t*>(0xE000E010U);
+  }
+  std::uint32_t last_ = 0;
+  std::int64_t ticks_ = 0;
+};
+
+// What a MAC has in silicon: a time that runs at addend / nominal of the timer, and an alarm on it.
+class AddendRegister {
+ public:
+  [[nodiscard]] std::int64_t at(std::int64_t raw_ns) {
+    const auto gone = static_cast<std::uint64_t>(raw_ns - raw_);
+    const std::int64_t now = local_ + static_cast<std::int64_t>((gone * addend_) >> 31);
+    if (now >= until_) {  // the alarm
+      until_ = INT64_MAX;
+      write(raw_ns, next_);
+    }
+    return now;
+  }
+  void obey(std::int64_t raw_ns, const ftcs_addend_command& command) {
+    local_ = at(raw_ns) + command.step_ns;
+    raw_ = raw_ns;
+    addend_ = command.addend;
+    next_ = command.next_addend;
+    until_ = command.until_ns;
+  }
+
+ private:
+  void write(std::int64_t raw_ns, std::uint32_t addend) {
+    local_ +=
+        static_cast<std::int64_t>((static_cast<std::uint64_t>(raw_ns - raw_) * addend_) >> 31);
+    raw_ = raw_ns;
+    addend_ = addend;
+  }
+  std::int64_t raw_ = 0;
+  std::int64_t local_ = 0;
+  std::int64_t until_ = INT64_MAX;
+  std::uint32_t addend_ = kNominal;
+  std::uint32_t next_ = kNominal;
+};
+
+// Outside of 200 us the whole offset is removed at once: the noise of polling is not for p.
+const ftcs_addend_config kServo = {kNominal,   10'000,  100'000,     4096, 200'000,
+                                   1'000'000,  kLockNs, 2 * kLockNs, 0,    0,
+                                   10'000'000, 1,       0,           0};
+
+class Node {
+ public:
+  Node() : receiver_(config()) { ftcs_addend_init(&servo_, &kServo, kNominal); }
+
+  bool run() {
+    lan9118_start();
+    handle(receiver_.start(now()));
+    while (timer_.ns() < 30'000'000'000 && !locked_) {
+      static_cast<void>(clock_.at(timer_.ns()));
+      if (const std::size_t size = lan9118_receive(frame_.data(), frame_.size()); size > 14)
+        receive(size);
+      if (receiver_.deadline() && *receiver_.deadline() <= now()) handle(receiver_.on_timer(now()));
+    }
+    return locked_;
+  }
+
+ private:
+  static ptp::TimeReceiverConfig config() {
+    ptp::TimeReceiverConfig c;
+    c.port = {{0x02, 0x00, 0x5E, 0xFF, 0xFE, 0x00, 0x01, 0x19}, 1};
+    c.fast_start = true;
+    c.log_min_delay_req_interval = -2;
+    return c;
+  }
+  FreeRunningTime now() { return FreeRunningTime::from_ns(timer_.ns()); }
+
+  // The steered clock's reading beside the timer's, kept until a Follow_Up or a Delay_Resp asks for
+  // it.
+  FreeRunningTime stamp() {
+    const std::int64_t raw = timer_.ns();
+    stamps_[next_stamp_++ % stamps_.size()] = {raw, clock_.at(raw)};
+    return FreeRunningTime::from_ns(raw);
+  }
+  std::int64_t local_of(FreeRunningTime stamp) const {
+    for (const auto& known : stamps_) {
+      if (known.raw == stamp.since_epoch().floor_ns()) return known.local;
+    }
+    return 0;
+  }
+
+  void receive(std::size_t size) {
+    if (frame_[12] != 0x88 || frame_[13] != 0xF7) return;
+    const std::span<const std::uint8_t> message(frame_.data() + 14, size - 14);
+    if ((message[0] & 0x0FU) < 8) {
+      const FreeRunningTime received = stamp();
+      handle(receiver_.on_event_message(message, received, received));
+    } else {
+      handle(receiver_.on_general_message(message, now()));
+    }
+  }
+
+  void handle(const ptp::ActionList& actions) {
+    for (const ptp::Action& action : actions) {
+      if (const auto* send = std::get_if<ptp::SendMessage>(&action)) transmit(*send);
+      if (const auto* emit = std::get_if<ptp::EmitPair>(&action)) steer(emit->pair);
+    }
+  }
+
+  void transmit(const ptp::SendMessage& send) {
+    static constexpr std::array<std::uint8_t, 14> kHeader{0x01, 0x1B, 0x19, 0,    0,    0,    0x02,
+                                                          0,    0x5E, 0,    0x01, 0x19, 0x88, 0xF7};
+    std::array<std::uint8_t, 128> out{};
+    std::size_t size = 0;
+    for (const std::uint8_t octet : kHeader) out[size++] = octet;
+    for (const std::uint8_t octet : send.bytes.view()) out[size++] = octet;
+    lan9118_send(out.data(), size < 60 ? 60 : size);
+    if (send.channel != ptp::Channel::kEvent) return;
+    const FreeRunningTime sent = stamp();
+    handle(receiver_.on_transmit_timestamp(send.id(), sent, sent));
+  }
+
+  void steer(const EventPair& pair) {
+    const std::int64_t local = local_of(pair.free_running);
+    const std::int64_t reference = pair.reference.since_epoch().floor_ns();
+    if (pair.direction == Direction::kBackward) {
+      // ((t4 - t1) - (t3 - t2)) / 2, t3 - t2 in reference time
+      if (samples_ > 0)
+        path_delay_ =
+            ((reference - servo_.origin_ns) * 65'536 - ftcs_addend_elapsed(&servo_, local)) / 2;
+      return;
+    }
+    const std::int64_t raw = timer_.ns();
+    const ftcs_addend_sample sample = {reference, local, clock_.at(raw), path_delay_, 0, 0};
+    const ftcs_addend_command command = ftcs_addend_update(&servo_, &sample);
+    if (command.act != 0) clock_.obey(raw, command);
+    ++samples_;
+    say(command);
+    locked_ = command.state == FTCS_ADDEND_LOCKED;
+  }
+
+  void say(const ftcs_addend_command& command) const {
+    board_text("Sync ");
+    board_decimal(samples_);
+    board_text(" offset ");
+    board_decimal(command.offset_ns);
+    board_text(" ns, step ");
+    board_decimal(command.step_ns);
+    board_text(" ns, path delay ");
+    board_decimal(path_delay_ / 65'536);
+    board_text(" ns, rate ");
+    board_decimal(ftcs_addend_rate_ppb(&servo_));
+    board_text(" ppb: ");
+    board_text(ftcs_addend_state_name(command.state));
+    board_end_line();
+  }
+
+  struct Stamp {
+    std::int64_t raw = -1;
+    std::int64_t local = 0;
+  };
+  Timer timer_;
+  AddendRegister clock_;
+  ptp::TimeReceiver receiver_;
+  ftcs_addend_servo servo_{};
+  std::array<Stamp, 8> stamps_{};
+  std::size_t next_stamp_ = 0;
+  std::array<std::uint8_t, 1536> frame_{};
+  std::int64_t path_delay_ = 0;
+  int samples_ = 0;
+  bool locked_ = false;
+};
+
+}  // namespace
+
+int main() {
+  static Node node;
+  const bool locked = node.run();
+  board_write(locked ? "locked\n" : "not locked\n");
+  return locked ? 0 : 1;
+}
