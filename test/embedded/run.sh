@@ -72,6 +72,8 @@ for cpu in m4f m7 m0plus; do
   fi
   arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror \
     -c examples/embedded/stm32_ptp_clock.c -o "$out/$cpu/stm32.o"
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Werror \
+    -I"$here/zephyr_stub" -c examples/embedded/zephyr/src/ftcs_ptp_servo.c -o "$out/$cpu/zephyr.o"
   arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 "${startup[@]}" "$here/addend_run.c" embedded/ftcs_addend.c "${link[@]}" \
     -o "$out/$cpu/addend.elf"
   emulate "${board[$cpu]}" "$out/$cpu/addend.elf" > "$out/$cpu/addend.txt"

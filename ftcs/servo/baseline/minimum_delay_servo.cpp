@@ -60,7 +60,8 @@ void MinimumDelayServo::add_to_window(const Stamp& forward, const Stamp& backwar
   // A backward message that waited has an early-looking free-running stamp.
   if (in_window_ == 0 || level(backward) > level(earliest_[1])) earliest_[1] = backward;
   // The first windows are short, so that there is a rate to take off in the long ones.
-  const std::uint32_t size = count_ < kWindowPoints ? std::min(config_.window, 2U) : config_.window;
+  const std::uint32_t size =
+      count_ < kWindowPoints ? std::min<std::uint32_t>(config_.window, 2U) : config_.window;
   if (++in_window_ < size) return;
   in_window_ = 0;
   add_exchange(earliest_[0], earliest_[1]);
