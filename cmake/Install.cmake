@@ -31,7 +31,7 @@ endforeach()
 install(TARGETS ftcs_cycle_servo ftcs_cycle_servo_small EXPORT ftcs
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 # The include path is the file path, installed or not.
-install(FILES ftcs/discipline/ftcs_cycle_servo.h
+install(FILES ftcs/discipline/ftcs_cycle_servo.h ftcs/discipline/ftcs_bus_clock.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ftcs/discipline)
 install(EXPORT ftcs NAMESPACE ftcs:: FILE ftcs-config.cmake DESTINATION ${FTCS_PACKAGE_DIR})
 # Before 1.0 a minor version may break what stood before.

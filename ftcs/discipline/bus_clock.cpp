@@ -160,7 +160,7 @@ void BusClock::move() noexcept {
     offset_ns_ += rate_ * cycle_ns();
   }
   decision_.rate_ppb = rate_ * 1e9;
-  decision_.offset_ns = std::llround(offset_ns_);
+  decision_.offset_ns = static_cast<std::int64_t>(std::floor(offset_ns_ + 0.5));
 }
 
 }  // namespace ftcs

@@ -1,4 +1,4 @@
-# The cycle servo for programs in C: static libraries that hold all they need but memcpy, memset and libm. Their sources
+# The cycle servo for programs in C: static libraries that hold all they need but memcpy, memset, memmove and libm. Their sources
 # are compiled once more, so that no other archive has to be linked.
 set(ftcs_cycle_sources ftcs_cycle_servo.cpp
   ${PROJECT_SOURCE_DIR}/ftcs/clock/cycle_timer.cpp
@@ -26,7 +26,8 @@ list(FILTER ftcs_servo_sources INCLUDE REGEX "^adaptive/.*\\.cpp$")
 list(TRANSFORM ftcs_servo_sources PREPEND ${PROJECT_SOURCE_DIR}/ftcs/servo/)
 get_target_property(ftcs_estimation_sources ftcs_estimation SOURCES)
 list(TRANSFORM ftcs_estimation_sources PREPEND ${PROJECT_SOURCE_DIR}/ftcs/estimation/)
-ftcs_cycle_library(ftcs_cycle_servo cycle_servo.cpp ${ftcs_servo_sources} ${ftcs_estimation_sources})
+ftcs_cycle_library(ftcs_cycle_servo bus_clock.cpp cycle_servo.cpp ftcs_bus_clock.cpp
+  ${ftcs_servo_sources} ${ftcs_estimation_sources})
 target_link_libraries(ftcs_cycle_servo PUBLIC m)
 
 if(FTCS_BUILD_TESTS)
@@ -42,4 +43,11 @@ if(FTCS_BUILD_TESTS)
       COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/check_cycle_servo_symbols.sh $<TARGET_FILE:${library}>)
     set_tests_properties(${library}_c99 ${library}_symbols PROPERTIES LABELS unit TIMEOUT 30)
   endforeach()
+  add_executable(ftcs_bus_clock_consumer ftcs_bus_clock_consumer.c)
+  set_target_properties(ftcs_bus_clock_consumer PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF
+    LINKER_LANGUAGE C)
+  target_compile_options(ftcs_bus_clock_consumer PRIVATE -Wall -Wextra -Wpedantic -Werror -fno-sanitize=all)
+  target_link_libraries(ftcs_bus_clock_consumer PRIVATE ftcs_cycle_servo)
+  add_test(NAME ftcs_bus_clock_c99 COMMAND ftcs_bus_clock_consumer)
+  set_tests_properties(ftcs_bus_clock_c99 PROPERTIES LABELS unit TIMEOUT 30)
 endif()

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cerrno>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -123,6 +124,12 @@ Result<platform::EthercatLink, platform::OsError> open_link(const daemon::RunOpt
                                    : platform::EthercatLink::open_raw(options.interface);
 }
 
+/// One MainDevice a wire: what is held against a second one on this host.
+std::string wire_of(const daemon::RunOptions& options) {
+  return options.interface.empty() ? fmt::format("udp {}:{}", options.host, options.port)
+                                   : options.interface;
+}
+
 int end_with(const std::string& message, int exit_code) {
   fmt::print(stderr, "ftcs ethercat: {}\n", message);
   return exit_code;
@@ -151,10 +158,17 @@ using Body = int (*)(daemon::MainRunner& runner, const std::function<bool()>& st
 /// What scan and run begin with: flags checked, link open.
 int with_runner(EthercatArguments arguments, Body body) {
   if (const auto wrong = complete(arguments)) return end_with(*wrong, kUsageError);
+  platform::LinuxKernel kernel;
+  const std::string wire = wire_of(arguments.options);
+  const int held = kernel.hold_name(("ftcs ethercat " + wire).c_str());
+  if (held == -EADDRINUSE) {
+    return end_with(fmt::format("another ftcs ethercat uses {} already: stop it first", wire),
+                    kRuntimeError);
+  }
+  const platform::Descriptor hold(kernel, held);
   auto link = open_link(arguments.options);
   if (!link) return end_with(link.error().message(), kRuntimeError);
   const platform::StopFlag stop_flag;
-  platform::LinuxKernel kernel;
   const auto runner = std::make_unique<daemon::MainRunner>(arguments.options, std::move(*link));
   if (!arguments.options.plant_time.empty()) {
     auto plant = daemon::PlantClock::open(arguments.options.plant_time, kernel);
