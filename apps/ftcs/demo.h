@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "apps/ftcs/live_view.h"
-#include "apps/ftcs/servo_trial.h"
 #include "ftcs/daemon/ptp_core_port.h"
+#include "ftcs/experiment/servo_trial.h"
 #include "ftcs/platform/child_process.h"
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/report/table.h"
@@ -47,7 +47,7 @@ struct DemoResult {
   double asymmetry_ns = 0.0;
   std::uint64_t samples = 0;
   bool interrupted = false;  ///< stopped before its time was up
-  std::vector<TrialResult> servos;
+  std::vector<experiment::TrialResult> servos;
 };
 
 /// Time receiver of the demonstration: one protocol core, and every servo on its own virtual clock
@@ -71,8 +71,8 @@ class DemoReceiver final : public daemon::PtpCorePort<ptp::TimeReceiver> {
 
   DemoOptions demo_;
   platform::ChildProcess* transmitter_;
-  TrueReference truth_;
-  std::vector<std::unique_ptr<ServoTrial>> trials_;
+  experiment::TrueReference truth_;
+  std::vector<std::unique_ptr<experiment::ServoTrial>> trials_;
   // t2 - t1 of every Sync and t4 - t3 of every answered request, on the common oscillator.
   std::vector<double> one_way_ns_;
   std::vector<double> way_back_ns_;

@@ -15,7 +15,7 @@ Plot offset_plot_of(const DemoResult& result) {
   plot.title = "PTP: true offset at each Sync message, local minus reference";
   plot.x_label = "Sync message";
   plot.y_label = "us";
-  for (const TrialResult& servo : result.servos) {
+  for (const experiment::TrialResult& servo : result.servos) {
     plot.series.push_back(trace_series(servo.servo, servo.true_offsets_ns, 1.0, 1e3));
   }
   plot.note = fmt::format("The lock band is ±{}. Zoom in to see more than the first jump.",
@@ -24,7 +24,7 @@ Plot offset_plot_of(const DemoResult& result) {
 }
 
 std::string lock_text(const DemoResult& result) {
-  const TrialResult& first = result.servos.front();
+  const experiment::TrialResult& first = result.servos.front();
   if (!first.cycles_to_lock) return "not locked";
   return fmt::format("{} control interval{}", *first.cycles_to_lock,
                      *first.cycles_to_lock == 1 ? "" : "s");

@@ -65,8 +65,9 @@ DemoReceiver::DemoReceiver(platform::Kernel& kernel, const daemon::PtpOptions& o
   for (const ServoConfig& servo : demo_servos(demo, interval)) {
     DisciplineConfig discipline;
     discipline.servo = servo;
-    trials_.push_back(std::make_unique<ServoTrial>(
-        ServoTrial::Setup{std::string(servo_kind_name(servo.kind)), discipline, start, truth_},
+    trials_.push_back(std::make_unique<experiment::ServoTrial>(
+        experiment::ServoTrial::Setup{std::string(servo_kind_name(servo.kind)), discipline, start,
+                                      truth_},
         oscillator()));
   }
 }
@@ -87,7 +88,7 @@ void DemoReceiver::on_pair(const EventPair& pair) {
 }
 
 void DemoReceiver::draw() {
-  std::vector<const ServoTrial*> shown;
+  std::vector<const experiment::ServoTrial*> shown;
   for (const auto& trial : trials_) shown.push_back(trial.get());
   view_.draw(shown, seconds_since_start(), demo_.duration_s);
 }

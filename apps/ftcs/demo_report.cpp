@@ -13,7 +13,7 @@ namespace ftcs::app {
 Table demo_table(const DemoResult& result) {
   Table table({"servo", "locked", "cycles to lock", "true error, RMS", "offset it sees, RMS",
                "rate error, RMS", "excursions", "rejected"});
-  for (const TrialResult& servo : result.servos) {
+  for (const experiment::TrialResult& servo : result.servos) {
     table.add_row({servo.servo, servo.locked ? "yes" : "no",
                    servo.cycles_to_lock ? Cell::count(*servo.cycles_to_lock) : Cell{"-"},
                    format_time(servo.rms_time_error_ns), format_time(servo.rms_perceived_offset_ns),
@@ -33,7 +33,7 @@ std::string demo_method(const DemoOptions& options, const DemoResult& result) {
       "action.\nRMS figures from lock to the end of the run (not locked: its second half).\n",
       result.timestamps, result.samples, format_time(result.sync_interval_ns),
       format_time(options.offset.ns()), options.skew_ppb * 1e-3, options.max_frequency_ppb * 1e-3,
-      format_time(result.lock_band_ns), ServoTrial::kLockDwell);
+      format_time(result.lock_band_ns), experiment::ServoTrial::kLockDwell);
 }
 
 std::string demo_text(const DemoOptions& options, const DemoResult& result) {
@@ -52,7 +52,7 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
   root["asymmetry_ns"] = result.asymmetry_ns;
   root["lock_band_ns"] = result.lock_band_ns;
   root["ptp"] = Json::array();
-  for (const TrialResult& servo : result.servos) {
+  for (const experiment::TrialResult& servo : result.servos) {
     Json row;
     row["servo"] = servo.servo;
     row["locked"] = servo.locked;

@@ -71,7 +71,7 @@ std::string format_time(double ns) {
   return fmt::format("{:.0f} ns", ns);
 }
 
-void LiveView::draw(std::span<const ServoTrial* const> trials, double elapsed_seconds,
+void LiveView::draw(std::span<const experiment::ServoTrial* const> trials, double elapsed_seconds,
                     double total_seconds) {
   if (!enabled_) return;
   const std::size_t columns = terminal_columns();
@@ -83,7 +83,7 @@ void LiveView::draw(std::span<const ServoTrial* const> trials, double elapsed_se
                  columns, [](std::size_t room) {
                    return std::string("|true offset|, 10 ns to 1 ms").substr(0, room);
                  });
-  for (const ServoTrial* trial : trials) {
+  for (const experiment::ServoTrial* trial : trials) {
     const Telemetry& latest = trial->latest();
     const auto& truth = trial->true_offsets_ns();
     screen += line(fmt::format("{:>13}  {:>13}  {:>13}  {:>10.3f} ppm  {:<8} ", trial->name(),

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "apps/ftcs/servo_trial.h"
+#include "ftcs/experiment/servo_trial.h"
 
 namespace ftcs::app {
 
@@ -22,7 +22,7 @@ class LiveView {
  public:
   explicit LiveView(bool enabled) noexcept : enabled_(enabled) {}
 
-  void draw(std::span<const ServoTrial* const> trials, double elapsed_seconds,
+  void draw(std::span<const experiment::ServoTrial* const> trials, double elapsed_seconds,
             double total_seconds);
   /// Leaves the last picture standing and the cursor below it.
   void finish();

@@ -2,7 +2,7 @@
 // World: the underlying oscillator is perfect and is the reference plus a constant; the servo's own
 // oscillator is 50 ppm fast on it. A Sync every 125 ms, a Delay_Req 10 ms later, 1 us of path
 // either way, no noise.
-#include "apps/ftcs/servo_trial.h"
+#include "ftcs/experiment/servo_trial.h"
 
 #include <gtest/gtest.h>
 
@@ -27,14 +27,16 @@ class World {
     trial_.on_pair({Direction::kBackward, truth_.at(next_ + Duration{10ms} + kPath), sent});
     next_ = next_ + kInterval;
   }
-  [[nodiscard]] TrialResult result(double band_ns) const { return trial_.result(band_ns); }
+  [[nodiscard]] experiment::TrialResult result(double band_ns) const {
+    return trial_.result(band_ns);
+  }
 
  private:
   static constexpr Duration kPath{1us};
   static constexpr Duration kInterval{125ms};
 
-  ServoTrial::Setup setup(ServoKind kind) {
-    ServoTrial::Setup setup;
+  experiment::ServoTrial::Setup setup(ServoKind kind) {
+    experiment::ServoTrial::Setup setup;
     setup.name = "under test";
     setup.discipline.servo.kind = kind;
     setup.discipline.servo.sync_interval = 125ms;
@@ -49,16 +51,16 @@ class World {
 
   FreeRunningTime start_ = FreeRunningTime::from_ns(5'000'000'000);
   FreeRunningTime next_ = start_ + Duration{100ms};
-  TrueReference truth_{Duration{37s}};
+  experiment::TrueReference truth_{Duration{37s}};
   test::ManualSource source_;
   SkewedSource oscillator_{source_, Rate::from_ppm(50.0), start_};
-  ServoTrial trial_;
+  experiment::ServoTrial trial_;
 };
 
 TEST(ServoTrial, counts_one_interval_for_ftcs_without_noise) {
   World world(ServoKind::kFtcs);
   for (int i = 0; i < 40; ++i) world.exchange();
-  const TrialResult result = world.result(100.0);
+  const experiment::TrialResult result = world.result(100.0);
   EXPECT_TRUE(result.locked);
   EXPECT_EQ(result.cycles_to_lock, 1U);
   EXPECT_EQ(result.locked_at_sync, 3U) << "it acted on the second";
@@ -71,7 +73,7 @@ TEST(ServoTrial, counts_one_interval_for_ftcs_without_noise) {
 TEST(ServoTrial, a_servo_that_never_steers_is_never_locked_however_near_it_starts) {
   World world(ServoKind::kFreeRunning);
   for (int i = 0; i < 40; ++i) world.exchange();
-  const TrialResult result = world.result(1e9);
+  const experiment::TrialResult result = world.result(1e9);
   EXPECT_FALSE(result.locked);
   EXPECT_FALSE(result.cycles_to_lock.has_value());
   EXPECT_FALSE(result.locked_at_sync.has_value());
@@ -81,7 +83,7 @@ TEST(ServoTrial, a_servo_that_never_steers_is_never_locked_however_near_it_start
 TEST(ServoTrial, the_slower_servo_needs_more_intervals) {
   World world(ServoKind::kLinuxptpPi);
   for (int i = 0; i < 400; ++i) world.exchange();
-  const TrialResult result = world.result(1000.0);
+  const experiment::TrialResult result = world.result(1000.0);
   EXPECT_TRUE(result.locked);
   EXPECT_GT(result.cycles_to_lock.value_or(0), 10U);
 }
@@ -89,7 +91,7 @@ TEST(ServoTrial, the_slower_servo_needs_more_intervals) {
 TEST(ServoTrial, the_true_error_is_judged_not_the_offset_that_the_servo_sees) {
   World world(ServoKind::kFtcs);
   for (int i = 0; i < 40; ++i) world.exchange(i % 2 == 0 ? Duration{} : Duration{2us});
-  const TrialResult result = world.result(1e5);
+  const experiment::TrialResult result = world.result(1e5);
   EXPECT_GT(result.rms_perceived_offset_ns, 100.0);
   EXPECT_NE(result.rms_time_error_ns, result.rms_perceived_offset_ns);
   EXPECT_GT(result.rms_second_half_ns, 0.0);
@@ -100,7 +102,7 @@ TEST(ServoTrial, the_true_error_is_judged_not_the_offset_that_the_servo_sees) {
 TEST(ServoTrial, half_of_a_path_longer_one_way_stays_in_the_mean) {
   World world(ServoKind::kAdaptive);
   for (int i = 0; i < 80; ++i) world.exchange(Duration{2us});
-  const TrialResult result = world.result(1e5);
+  const experiment::TrialResult result = world.result(1e5);
   EXPECT_NEAR(result.mean_second_half_ns, -1000.0, 1.0);
   EXPECT_NEAR(result.rms_second_half_ns, 1000.0, 1.0);
 }

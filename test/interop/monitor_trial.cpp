@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/ftcs/servo_trial.h"
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/clock/skewed_source.h"
+#include "ftcs/experiment/servo_trial.h"
 #include "ftcs/platform/kernel.h"
 #include "ftcs/platform/local_socket.h"
 #include "ftcs/platform/timestamp_clock.h"
@@ -47,8 +47,9 @@ class Trials {
       DisciplineConfig discipline;
       discipline.servo.kind = kind;
       discipline.servo.linuxptp_pi.first_step_threshold = Nanoseconds{0};
-      trials_.push_back(std::make_unique<app::ServoTrial>(
-          app::ServoTrial::Setup{std::string(servo_kind_name(kind)), discipline, clock, truth_},
+      trials_.push_back(std::make_unique<experiment::ServoTrial>(
+          experiment::ServoTrial::Setup{std::string(servo_kind_name(kind)), discipline, clock,
+                                        truth_},
           source));
     }
   }
@@ -69,7 +70,7 @@ class Trials {
         "{\"syncs\": %llu, \"realtime_drift_ns\": %.1f, \"asymmetry_ns\": %.1f, \"servos\": [",
         static_cast<unsigned long long>(syncs), drift, asymmetry);
     for (std::size_t i = 0; i < trials_.size(); ++i) {
-      const app::TrialResult result = trials_[i]->result(kLockBandNs);
+      const experiment::TrialResult result = trials_[i]->result(kLockBandNs);
       std::printf(
           "%s{\"servo\": \"%s\", \"locked\": %s, \"cycles_to_lock\": %lld, "
           "\"true_error_rms_ns\": %.1f, \"true_error_mean_ns\": %.1f, "
@@ -84,10 +85,10 @@ class Trials {
 
  private:
   SkewedSource& source_;
-  app::TrueReference truth_;
+  experiment::TrueReference truth_;
   std::vector<double> ahead_ns_;
   std::vector<double> back_ns_;
-  std::vector<std::unique_ptr<app::ServoTrial>> trials_;
+  std::vector<std::unique_ptr<experiment::ServoTrial>> trials_;
 };
 
 int run(const std::string& path, double seconds) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "apps/ftcs/servo_trial.h"
+#include "ftcs/experiment/servo_trial.h"
 
 #include <cmath>
 #include <span>
 
 #include "ftcs/analysis/statistics.h"
 
-namespace ftcs::app {
+namespace ftcs::experiment {
 namespace {
 
 RunningStatistics statistics_of(std::span<const double> values) {
@@ -97,4 +97,4 @@ TrialResult ServoTrial::result(double lock_band_ns) const {
   return result;
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::experiment

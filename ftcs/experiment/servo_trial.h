@@ -11,7 +11,7 @@
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 
-namespace ftcs::app {
+namespace ftcs::experiment {
 
 /// Where the reference truly is: known only because both clocks of a trial stand on one oscillator.
 /// reference = underlying oscillator + offset.
@@ -99,4 +99,4 @@ class ServoTrial {
   std::vector<double> rate_error_ppb_;
 };
 
-}  // namespace ftcs::app
+}  // namespace ftcs::experiment
