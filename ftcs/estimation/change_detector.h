@@ -13,15 +13,17 @@ namespace ftcs::estimation {
 
 /// What the last messages allow to believe of a sudden change.
 struct ChangeTrust {
-  bool sudden = true;        ///< a clock can have brought it; else nothing that one message shows
+  bool sudden = true;        ///< a clock can have brought it; else nothing that one
+                             ///< message shows
   bool one_suffices = true;  ///< one message without a second that says the same
   bool seconded = true;      ///< there is such a second
 };
 
-/// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between the models of a
-/// bank: C_ij = max(0, C_ij + l_j - l_i) for every model j that stands behind i, i.e. is wilder.
-/// Beyond the threshold model i has been overtaken by events and takes over the state of the most
-/// convincing j; this shortens the memory of calm models at once after a change.
+/// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between
+/// the models of a bank: C_ij = max(0, C_ij + l_j - l_i) for every model j that
+/// stands behind i, i.e. is wilder. Beyond the threshold model i has been
+/// overtaken by events and takes over the state of the most convincing j; this
+/// shortens the memory of calm models at once after a change.
 template <class Grid>
 class ChangeDetector {
  public:
@@ -30,7 +32,8 @@ class ChangeDetector {
   /// All but the wildest.
   static constexpr std::size_t kRows = kSize - 1;
 
-  /// Bit i: model i may have been overtaken. Only then is take_over(i) worth asking.
+  /// Bit i: model i may have been overtaken. Only then is take_over(i) worth
+  /// asking.
   std::uint32_t add(const std::array<double, kSize>& log_density) noexcept {
     std::array<float, kWidth> l{};
     for (std::size_t j = 0; j < kWidth; ++j) {
@@ -48,7 +51,8 @@ class ChangeDetector {
         return sum;
       };
       std::size_t j = (i + 1) / kFour * kFour;
-      // Nothing of calmer models in the group of four where the wilder ones begin.
+      // Nothing of calmer models in the group of four where the wilder ones
+      // begin.
       Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
       Quad peak{};
       if (j < kLast) {
@@ -67,12 +71,13 @@ class ChangeDetector {
     bool alone = false;  ///< for one message's sake
   };
 
-  /// The model that overtakes model i after `count` messages, the last of which had
-  /// `log_density`, or kNone. Clears its sums.
+  /// The model that overtakes model i after `count` messages, the last of which
+  /// had `log_density`, or kNone. Clears its sums.
   [[nodiscard]] Takeover take_over(std::size_t i, double count,
                                    const std::array<double, kSize>& log_density,
                                    const ChangeTrust& trust) noexcept {
-    // Early on every ratio is noisy; the factor keeps the false alarms of the first messages rare.
+    // Early on every ratio is noisy; the factor keeps the false alarms of the
+    // first messages rare.
     const double caution = 1.0 + 16.0 / count;
     const std::size_t winner = most_convincing(i);
     if (winner == kNone) return {};
@@ -115,15 +120,17 @@ class ChangeDetector {
     return winner;
   }
 
-  /// Nats. One false alarm per e^9.5 = 13,000 messages and pair of models at most (Wald); measured,
-  /// with what else is asked of a change: one that mattered in two million.
+  /// Nats. One false alarm per e^9.5 = 13,000 messages and pair of models at
+  /// most (Wald); measured, with what else is asked of a change: one that
+  /// mattered in two million.
   static constexpr double kThreshold = 9.5;
-  /// What one message brings a good part of is a change, and must be followed at once; what
-  /// has gathered over many is more often chance, and costs a calm model all that it knew.
+  /// What one message brings a good part of is a change, and must be followed
+  /// at once; what has gathered over many is more often chance, and costs a
+  /// calm model all that it knew.
   static constexpr double kAbrupt = 5.0;
   static constexpr double kGradual = 13.0;
-  /// What one message says alone, without so much from those before, is now and then the far end of
-  /// the noise: five sigma come once in two million.
+  /// What one message says alone, without so much from those before, is now and
+  /// then the far end of the noise: five sigma come once in two million.
   static constexpr double kAlone = 11.0;
   static constexpr double kSecond = 2.0;
   static constexpr std::size_t kSudden = Grid::kSudden;

@@ -116,8 +116,8 @@ TEST(ChangeDetector, early_on_it_asks_for_more) {
   EXPECT_EQ(detector.take_over(5, kLater, l, kTrusted).source, 20U);
 }
 
-/// Two models with the same mean and variances 1 and 1.2, data from the first: exp(11) messages
-/// between false alarms is Wald's bound.
+/// Two models with the same mean and variances 1 and 1.2, data from the first:
+/// exp(11) messages between false alarms is Wald's bound.
 TEST(ChangeDetector, false_alarms_are_rare) {
   Detector detector;
   std::mt19937_64 random(1);

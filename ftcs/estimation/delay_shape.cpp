@@ -13,7 +13,8 @@ namespace {
 constexpr double kLn2Pi = 1.8378770664093453;
 /// Beyond this many sigma on the late side the normal part no longer matters.
 constexpr double kFarLate = 8.0;
-/// Below this the quotient of density and distribution needs its asymptotic series.
+/// Below this the quotient of density and distribution needs its asymptotic
+/// series.
 constexpr double kFarEarly = -6.0;
 constexpr double kSmallestCurvature = 1e-12;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: one innovation under known noise; oracles are numerical integration and differences.
+// World: one innovation under known noise; oracles are numerical integration
+// and differences.
 #include "ftcs/estimation/delay_shape.h"
 
 #include <cmath>

@@ -8,13 +8,15 @@
 
 namespace ftcs::estimation {
 
-/// Counts the messages of each direction that nothing believed explains; each that it does explain
-/// takes one away. When several of both directions are left, and not all of them late, neither
-/// outliers nor a longer path nor a host that stood still can be the reason: the filters have
-/// diverged, and to start from nothing is quicker than to mend them.
+/// Counts the messages of each direction that nothing believed explains; each
+/// that it does explain takes one away. When several of both directions are
+/// left, and not all of them late, neither outliers nor a longer path nor a
+/// host that stood still can be the reason: the filters have diverged, and to
+/// start from nothing is quicker than to mend them.
 class DivergenceWatch {
  public:
-  /// `side`: 0 forward, 1 backward; `early`: before the moment that was believed.
+  /// `side`: 0 forward, 1 backward; `early`: before the moment that was
+  /// believed.
   void observe(std::size_t side, bool rejected, bool early) noexcept {
     std::uint8_t& left = left_[side];
     if (rejected) {
@@ -30,7 +32,8 @@ class DivergenceWatch {
   }
 
  private:
-  /// Four of each: with one outlier in ten, half of them early, once in 10^8 messages at most.
+  /// Four of each: with one outlier in ten, half of them early, once in 10^8
+  /// messages at most.
   static constexpr std::uint8_t kEnough = 4;
 
   std::array<std::uint8_t, 2> left_{};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// World: a sequence of messages, late (l) or early (e) against what is believed, capitals forward;
-// = and - are messages that are explained, forward and backward.
+// World: a sequence of messages, late (l) or early (e) against what is
+// believed, capitals forward; = and - are messages that are explained, forward
+// and backward.
 #include "ftcs/estimation/divergence_watch.h"
 
 #include <string_view>

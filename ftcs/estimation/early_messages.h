@@ -8,16 +8,19 @@
 
 namespace ftcs::estimation {
 
-/// Learns what early messages mean here. One that comes far before the moment believed is a clock
-/// whose rate has changed, or an outlier: a late transmit stamp, a lucky packet on a loaded bridge.
-/// The next messages tell. Until changes have proved to be the rule no single message changes the
-/// rate; and how often each direction has outliers is its share of what came early. Late ones,
-/// which are common, are only remembered until the next of their direction tells.
+/// Learns what early messages mean here. One that comes far before the moment
+/// believed is a clock whose rate has changed, or an outlier: a late transmit
+/// stamp, a lucky packet on a loaded bridge. The next messages tell. Until
+/// changes have proved to be the rule no single message changes the rate; and
+/// how often each direction has outliers is its share of what came early. Late
+/// ones, which are common, are only remembered until the next of their
+/// direction tells.
 class EarlyMessages {
  public:
   enum class Message : std::uint8_t { kFits, kEarly, kLate, kNeither };
-  /// A message was judged: as believed, far before it, far after it, or between. True: one before
-  /// that was far off has proved to be an outlier, and what it said for a change is void.
+  /// A message was judged: as believed, far before it, far after it, or
+  /// between. True: one before that was far off has proved to be an outlier,
+  /// and what it said for a change is void.
   [[nodiscard]] bool observe(Direction direction, Message message) noexcept {
     Side& side = sides_[direction];
     ++side.messages;
@@ -36,8 +39,9 @@ class EarlyMessages {
     side.late = (side.late && !fits) || message == Message::kLate;
     return explained;
   }
-  /// A rate that has changed makes one direction ever earlier, the other later: whether this
-  /// message says otherwise than an early one that is not explained yet.
+  /// A rate that has changed makes one direction ever earlier, the other later:
+  /// whether this message says otherwise than an early one that is not
+  /// explained yet.
   [[nodiscard]] bool contradicted_by(Direction direction, bool early) const noexcept {
     return early ? sides_[opposite(direction)].pending : sides_[direction].pending;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// World: test/support/loaded_path.h without load; jitter of 100 ns, a clock that does not wander,
-// one message in 300 of each direction early. Largest true error after the first 60 cycles, worst
-// seed.
+// World: test/support/loaded_path.h without load; jitter of 100 ns, a clock
+// that does not wander, one message in 300 of each direction early. Largest
+// true error after the first 60 cycles, worst seed.
 #include <algorithm>
 #include <cstdio>
 

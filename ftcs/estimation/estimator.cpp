@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Length: the order of the steps is the algorithm, and each reads the same small state.
+// Length: the order of the steps is the algorithm, and each reads the same
+// small state.
 #include "ftcs/estimation/estimator.h"
 
 #include <algorithm>
@@ -12,55 +13,61 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Start of offset (beyond the first reading), rate and delay, in units of s and s per cycle: wide
-/// enough to be forgotten with the first message that sees them.
+/// Start of offset (beyond the first reading), rate and delay, in units of s
+/// and s per cycle: wide enough to be forgotten with the first message that
+/// sees them.
 constexpr double kOffsetPrior = 4e10;
 constexpr double kRatePrior = 1e10;
 constexpr double kDelayPrior = 1e10;
-/// Four and a half sigma, squared: noise does so once in three hundred thousand messages.
+/// Four and a half sigma, squared: noise does so once in three hundred thousand
+/// messages.
 constexpr double kFarOff = 20.0;
-/// Messages after which each of these may begin; before, every prediction is still prior.
+/// Messages after which each of these may begin; before, every prediction is
+/// still prior.
 constexpr std::uint32_t kEvidenceFrom = 3;
 constexpr std::uint32_t kMixFrom = 4;
 constexpr std::uint32_t kJudgeFrom = 6;
 constexpr std::uint32_t kLearnFrom = 16;
 constexpr std::uint32_t kYoung = 100;
-/// Where the noise is known: a host that stands still makes more than half of the window late now
-/// and then, and its milliseconds must not become the noise at once.
+/// Where the noise is known: a host that stands still makes more than half of
+/// the window late now and then, and its milliseconds must not become the noise
+/// at once.
 constexpr double kLargestResidual = 30.0;
-/// The second opinion costs more than everything else: always early, later every so often.
+/// The second opinion costs more than everything else: always early, later
+/// every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
 constexpr std::uint8_t kOpinionWhile = 16;
-/// Residuals this many times below the innovations are not chance: with f degrees of freedom the
-/// probability of such luck is about (f / 2 k^2)^(f/2) / Gamma(f/2 + 1), below 1e-6 with sixteen
-/// messages. Filters that have only just started again have less to lose.
+/// Residuals this many times below the innovations are not chance: with f
+/// degrees of freedom the probability of such luck is about (f / 2 k^2)^(f/2) /
+/// Gamma(f/2 + 1), below 1e-6 with sixteen messages. Filters that have only
+/// just started again have less to lose.
 constexpr double kContradiction = 10.0;
 constexpr double kYoungContradiction = 5.0;
-/// Rejections in a row of one direction, or innovations that hardly differ, after which it is asked
-/// every time for a while.
+/// Rejections in a row of one direction, or innovations that hardly differ,
+/// after which it is asked every time for a while.
 constexpr int kSurprises = 3;
 
 std::size_t index_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 0 : 1;
 }
-/// Six messages: short enough for the three or four that follow a change, long enough not to follow
-/// the noise. Its usual fluctuation stays below 1.6.
+/// Six messages: short enough for the three or four that follow a change, long
+/// enough not to follow the noise. Its usual fluctuation stays below 1.6.
 constexpr double kSurpriseShare = 1.0 / 6.0;
 constexpr double kUsualSurprise = 1.6;
 constexpr double kSurpriseLimit = 100.0;
-/// The sharpest shape tried has a normal part of a seventh of the tail. Where that is the best
-/// shape the true edge is anything between that soft and as sharp as can be, and then the filter
-/// puts the floor 5.4 % of the tail too late (measured). Taken back is the middle; what is open is
-/// as much.
+/// The sharpest shape tried has a normal part of a seventh of the tail. Where
+/// that is the best shape the true edge is anything between that soft and as
+/// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
+/// late (measured). Taken back is the middle; what is open is as much.
 constexpr double kEdgeBias = 0.027;
 constexpr double kFloorDoubt = 0.03;
 constexpr double kSharpest = 0.97;
 
 double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
 
-/// Geometric mean of the standard deviations of one or both directions, of the product of their
-/// variances.
+/// Geometric mean of the standard deviations of one or both directions, of the
+/// product of their variances.
 double common_deviation(double variances, int sides) noexcept {
   const double root = std::sqrt(variances);
   return sides == 2 ? std::sqrt(root) : root;
@@ -84,7 +91,8 @@ void Estimator<Grid>::restart() noexcept {
   delay_freed_ = delay_freed;
 }
 
-/// Kept in the mixed estimate, which nobody else needs before the first message.
+/// Kept in the mixed estimate, which nobody else needs before the first
+/// message.
 template <class Grid>
 void Estimator<Grid>::expect(const RatePrior& rate, double noise_ns) noexcept {
   scale_ = robust_scale_ = noise_ns;
@@ -107,9 +115,9 @@ void Estimator<Grid>::begin(std::size_t side) noexcept {
   best_ = Grid::kStart;
 }
 
-/// With one direction only x + sign d is seen; d stays pinned to zero (no cancellation of huge
-/// covariances). The first message of the other direction sets it free:
-/// x = (x + sign d) - sign d.
+/// With one direction only x + sign d is seen; d stays pinned to zero (no
+/// cancellation of huge covariances). The first message of the other direction
+/// sets it free: x = (x + sign d) - sign d.
 template <class Grid>
 void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
@@ -127,8 +135,8 @@ void Estimator<Grid>::unpin_delay(double first_sign, double variance) noexcept {
   });
 }
 
-/// With so much doubt a first message that is late by more is an outlier; with none at all it would
-/// be believed.
+/// With so much doubt a first message that is late by more is an outlier; with
+/// none at all it would be believed.
 template <class Grid>
 void Estimator<Grid>::free_delay(double sigma_ns) noexcept {
   delay_freed_ = true;
@@ -139,8 +147,8 @@ void Estimator<Grid>::free_delay(double sigma_ns) noexcept {
 
 template <class Grid>
 void Estimator<Grid>::rescale_time(double factor) noexcept {
-  bank_.for_each([factor](Estimate& e) { estimation::rescale_time(e, factor); });
-  estimation::rescale_time(mixed_, factor);
+  bank_.for_each([factor](Estimate& e) { e.rescale_time(factor); });
+  mixed_.rescale_time(factor);
   jumps_.clear();  // measured in the old unit
   second_opinion_.rescale_time(factor);
 }
@@ -195,8 +203,8 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
   const double predicted = innovations.predicted[best_];
   gain_ = credit * predicted / (predicted + shape_[side].total_variance());
   if (count_ > kEvidenceFrom && observable()) {
-    // The credit of the best model, for all: a model that rejected every message as an outlier
-    // would otherwise gather no squares and look perfect.
+    // The credit of the best model, for all: a model that rejected every
+    // message as an outlier would otherwise gather no squares and look perfect.
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
   if (count_ > kJudgeFrom) {
@@ -307,7 +315,8 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
     begin_anew(jumps_.estimate());
     return;
   }
-  // From calm to wild: every source stands behind its target and still has its own state.
+  // From calm to wild: every source stands behind its target and still has its
+  // own state.
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const auto [source, alone] =
@@ -326,7 +335,8 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
   }
 }
 
-/// True if this message is to be heard once more, or if what was believed is worth nothing.
+/// True if this message is to be heard once more, or if what was believed is
+/// worth nothing.
 template <class Grid>
 bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
   const Gate::Verdict verdict = gate_.observe(side, credit, innovation < 0.0, since_change_);
@@ -388,13 +398,14 @@ void Estimator<Grid>::follow_scale() noexcept {
   }
   if (evidence_.messages() > 4.0 &&
       evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
-    // Old gross errors are all that the evidence tells. The model that has coped is right by now;
-    // without evidence any other might be chosen.
+    // Old gross errors are all that the evidence tells. The model that has
+    // coped is right by now; without evidence any other might be chosen.
     evidence_.forget();
     const Estimate coped = bank_.estimate(best_);
     bank_.for_each([&coped](Estimate& e) { e = coped; });
   }
-  // Fourth root of both directions' variances: the scale is their geometric mean.
+  // Fourth root of both directions' variances: the scale is their geometric
+  // mean.
   double learnt = 1.0;
   double assumed = 1.0;
   int sides = 0;
@@ -412,9 +423,9 @@ void Estimator<Grid>::follow_scale() noexcept {
   scale_ = std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_);
 }
 
-/// Brings the learnt shapes into use. When a tail appears or goes, the zero of the delay moves from
-/// the mean to the floor or back by `shift`; half of it was offset, half path delay, known to
-/// about 30 per cent.
+/// Brings the learnt shapes into use. When a tail appears or goes, the zero of
+/// the delay moves from the mean to the floor or back by `shift`; half of it
+/// was offset, half path delay, known to about 30 per cent.
 template <class Grid>
 void Estimator<Grid>::adopt_shapes() noexcept {
   double product = 1.0;
@@ -453,8 +464,8 @@ void Estimator<Grid>::adopt_shapes() noexcept {
   }
 }
 
-/// Exponential mean of nu^2 / S of the best model. What is taken for an outlier counts as far as
-/// outliers are not what one expects on this path.
+/// Exponential mean of nu^2 / S of the best model. What is taken for an outlier
+/// counts as far as outliers are not what one expects on this path.
 template <class Grid>
 void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
   const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
@@ -469,9 +480,10 @@ double Estimator<Grid>::widening() const noexcept {
   return std::max(1.0, surprise_level_ / kUsualSurprise);
 }
 
-/// Where the floor of a queueing delay lies is known to a few per cent of its tail only; equal
-/// errors of both directions cancel in the offset. While it is open whether there is a queue at
-/// all, the floor may be off by the whole tail.
+/// Where the floor of a queueing delay lies is known to a few per cent of its
+/// tail only; equal errors of both directions cancel in the offset. While it is
+/// open whether there is a queue at all, the floor may be off by the whole
+/// tail.
 template <class Grid>
 double Estimator<Grid>::floor_doubt_ns() const noexcept {
   const double share = two_way() ? 0.5 : 1.0;
@@ -483,11 +495,10 @@ double Estimator<Grid>::floor_doubt_ns() const noexcept {
 
 template <class Grid>
 double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
-  const double h = std::max(0.0, cycles);
-  const double variance = mixed_.xx + 2.0 * h * mixed_.xy + h * h * mixed_.yy +
-                          process_.white_fm * h + process_.random_walk_fm * h * h * h / 3.0;
+  Estimate then = mixed_;
+  then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
   const double floor = floor_doubt_ns();
-  return std::sqrt(scale_ * scale_ * widening() * std::max(variance, 0.0) + floor * floor);
+  return std::sqrt(scale_ * scale_ * widening() * std::max(then.xx, 0.0) + floor * floor);
 }
 
 template <class Grid>

@@ -21,7 +21,8 @@
 
 namespace ftcs::estimation {
 
-/// A path delay that is known otherwise (peer delay, wiring). Unknown: sigma_ns is negative.
+/// A path delay that is known otherwise (peer delay, wiring). Unknown: sigma_ns
+/// is negative.
 struct KnownDelay {
   double mean_ns = 0.0;
   double sigma_ns = -1.0;
@@ -34,25 +35,27 @@ struct RatePrior {
   double sigma = 0.0;
 };
 
-/// Joint estimate of offset, rate and path delay of the free-running clock against the reference:
-/// the bank, its evidence, what is learnt about noise, and the detection of changes.
+/// Joint estimate of offset, rate and path delay of the free-running clock
+/// against the reference: the bank, its evidence, what is learnt about noise,
+/// and the detection of changes.
 template <class Grid>
 class Estimator {
  public:
   explicit Estimator(const KnownDelay& delay = {}) noexcept : known_delay_(delay) {}
-  /// Forgets everything but what is known of the delay, in place: a temporary would be kilobytes of
-  /// stack.
+  /// Forgets everything but what is known of the delay, in place: a temporary
+  /// would be kilobytes of stack.
   void restart() noexcept;
 
-  /// Before the first message: a rate and a timestamp noise (ns) to start from. The noise is a
-  /// start as any other; the rate counts as much as its sigma says.
+  /// Before the first message: a rate and a timestamp noise (ns) to start from.
+  /// The noise is a start as any other; the rate counts as much as its sigma
+  /// says.
   void expect(const RatePrior& rate, double noise_ns) noexcept;
 
   /// No noise is smaller than this, ns: what rounds the timestamps makes some.
   void expect_noise_of_at_least(double noise_ns) noexcept { least_noise_ = noise_ns; }
 
-  /// The delay that was known is estimated from now on, from what it was, give or take sigma_ns:
-  /// messages of the other direction will come.
+  /// The delay that was known is estimated from now on, from what it was, give
+  /// or take sigma_ns: messages of the other direction will come.
   void free_delay(double sigma_ns) noexcept;
   /// It is known again. Before the first message only.
   void fix_delay() noexcept { delay_freed_ = false; }
@@ -67,9 +70,10 @@ class Estimator {
   [[nodiscard]] double log_density() const noexcept { return static_cast<double>(said_); }
   [[nodiscard]] const ModelBank<Grid>& bank() const noexcept { return bank_; }
   [[nodiscard]] const Evidence<Grid>& evidence() const noexcept { return evidence_; }
-  /// Honest standard deviation of the offset `cycles` after the last message, ns: what the filters
-  /// believe, grown by the process noise that they cannot exclude, widened while recent innovations
-  /// are larger than believed, plus what the shape of the delay noise leaves open.
+  /// Honest standard deviation of the offset `cycles` after the last message,
+  /// ns: what the filters believe, grown by the process noise that they cannot
+  /// exclude, widened while recent innovations are larger than believed, plus
+  /// what the shape of the delay noise leaves open.
   [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
   /// Of the rate, ns per cycle, and of the path delay, ns, at the last message.
   [[nodiscard]] double rate_sigma_ns() const noexcept;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// World: one direction, one message a cycle, white timestamp noise of 100 ns, white FM of a and
-// random-walk FM of b (variances per cycle in units of the noise). Oracle and bound: a two-state
-// Kalman filter that knows a, b and the noise. Both are judged by the error of their prediction of
-// the next offset, which is what a steered clock has at the next message.
+// World: one direction, one message a cycle, white timestamp noise of 100 ns,
+// white FM of a and random-walk FM of b (variances per cycle in units of the
+// noise). Oracle and bound: a two-state Kalman filter that knows a, b and the
+// noise. Both are judged by the error of their prediction of the next offset,
+// which is what a steered clock has at the next message.
 #include "ftcs/estimation/estimator.h"
 
 #include <algorithm>
@@ -48,8 +49,8 @@ struct Ratio {
   double late, early;
 };
 
-/// RMS prediction error over that of the bound: cycles 1,000 to 2,000, and the first ten after the
-/// second message.
+/// RMS prediction error over that of the bound: cycles 1,000 to 2,000, and the
+/// first ten after the second message.
 Ratio compare(double a, double b, int runs, int cycles) {
   double late = 0.0, late_bound = 0.0, early = 0.0, early_bound = 0.0;
   for (int run = 0; run < runs; ++run) {
@@ -126,7 +127,8 @@ TEST(Estimator, the_gain_falls_by_itself) {
   EXPECT_NEAR(estimator.noise_ns(Direction::kForward), kNoise, 12.0);
 }
 
-/// Two directions in turn, half a cycle apart, as a network with one path delay brings them.
+/// Two directions in turn, half a cycle apart, as a network with one path delay
+/// brings them.
 class TwoWay {
  public:
   explicit TwoWay(std::uint64_t seed = 1) : random_(seed) {}
@@ -147,7 +149,8 @@ class TwoWay {
   Estimator<FullGrid> estimator;
   double offset = 0.0, rate = 50.0, ahead = 10'000.0, back = 10'000.0, noise = 10.0;
   double spikes = 0.0;  ///< share of messages that are 100 us late
-  double queue = 0.0;  ///< of forward messages: mean of an exponential delay, in place of the noise
+  double queue = 0.0;   ///< of forward messages: mean of an exponential delay, in
+                        ///< place of the noise
 
  private:
   std::mt19937_64 random_;

@@ -12,10 +12,11 @@ namespace ftcs::estimation {
 
 /// What speaks for each model of a bank, the size s of the noise profiled out:
 ///
-///     c_i = W ln(V_i / W) + L_i,   V = sum of s^2 nu^2 / S,  L = sum of ln(S / s^2),  W messages
+///     c_i = W ln(V_i / W) + L_i,   V = sum of s^2 nu^2 / S,  L = sum of ln(S /
+///     s^2),  W messages
 ///
-/// c_i is minus twice the log-likelihood but for a constant. Messages count by their credit; the
-/// memory grows up to 4,000 of them.
+/// c_i is minus twice the log-likelihood but for a constant. Messages count by
+/// their credit; the memory grows up to 4,000 of them.
 template <class Grid>
 class Evidence {
  public:
@@ -36,7 +37,8 @@ class Evidence {
     if (messages_ > kMemory) shrink();
   }
   void forget() noexcept { *this = Evidence{}; }
-  /// What another bank has heard of the same models, which stand there at places[i].
+  /// What another bank has heard of the same models, which stand there at
+  /// places[i].
   template <class Other>
   void take_from(const Evidence<Other>& other,
                  const std::array<std::size_t, kSize>& places) noexcept {
@@ -52,8 +54,8 @@ class Evidence {
   /// V_i / W: the squared noise that model i sees, ns^2. Valid: messages() > 0.
   [[nodiscard]] double mean_square(std::size_t i) const noexcept { return squares_[i] / messages_; }
 
-  /// Writes the models' weights exp(-c_i / 2), sum one, and returns the heaviest. Valid: messages()
-  /// > 0.
+  /// Writes the models' weights exp(-c_i / 2), sum one, and returns the
+  /// heaviest. Valid: messages() > 0.
   [[nodiscard]] std::size_t weigh(Row& weight) const noexcept {
     Row cost;
     const double per_message = 1.0 / messages_;
@@ -111,16 +113,17 @@ class Evidence {
   static constexpr double kHighestCost = 1e300;
   /// Nats; a weight of e^-40 moves nothing.
   static constexpr double kHopeless = 40.0;
-  /// Twice nats per place behind the starting model: with three messages every model is as likely
-  /// as the next, and the wildest would take the noise for motion. Forgotten after a dozen
-  /// messages.
+  /// Twice nats per place behind the starting model: with three messages every
+  /// model is as likely as the next, and the wildest would take the noise for
+  /// motion. Forgotten after a dozen messages.
   static constexpr double kWildnessCost = 1.0;
-  /// And before it: how slowly an oscillator wanders shows only after thousands of messages; until
-  /// then the calmer of two models that explain the same is the better bet. More than this costs
-  /// oscillators that do wander slowly.
+  /// And before it: how slowly an oscillator wanders shows only after thousands
+  /// of messages; until then the calmer of two models that explain the same is
+  /// the better bet. More than this costs oscillators that do wander slowly.
   static constexpr double kCalmGain = 0.3;
-  /// Twice nats for the one model of a slow wander that is too fast for the five nearly constant
-  /// ones to stand in for it, and whose own neighbours cost 10 to 40 %: against their number.
+  /// Twice nats for the one model of a slow wander that is too fast for the
+  /// five nearly constant ones to stand in for it, and whose own neighbours
+  /// cost 10 to 40 %: against their number.
   static constexpr double kFavour = 1.7;
   static constexpr Row kPlaceCost = []() constexpr {
     Row row{};

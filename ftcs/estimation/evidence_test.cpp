@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: squared innovations and variances that are given by hand; oracle is the formula of the
-// header, written plainly.
+// World: squared innovations and variances that are given by hand; oracle is
+// the formula of the header, written plainly.
 #include "ftcs/estimation/evidence.h"
 
 #include <array>
@@ -85,7 +85,8 @@ void expect_weights_of_the_formula() {
 
 TEST(Evidence, weighs_the_models_by_the_likelihood_with_the_scale_profiled_out) {
   expect_weights_of_the_formula<FullGrid>();   // two at a time
-  expect_weights_of_the_formula<SmallGrid>();  // an odd number of models: one by one
+  expect_weights_of_the_formula<SmallGrid>();  // an odd number of models: one by
+                                               // one
 }
 
 TEST(Evidence, one_gross_innovation_counts_no_more_than_its_limit) {

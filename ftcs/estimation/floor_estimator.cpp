@@ -12,12 +12,13 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Share of messages before the floor. Only a broken stamp, or a clock that changed, makes one.
+/// Share of messages before the floor. Only a broken stamp, or a clock that
+/// changed, makes one.
 constexpr double kEarly = 1e-5;
 constexpr double kLn2Pi = 1.8378770664093453;
 constexpr double kLeastLogDensity = -700.0;
-/// Memories in messages: of the share at the floor, of the same for a load that has just changed,
-/// and of the noise there.
+/// Memories in messages: of the share at the floor, of the same for a load that
+/// has just changed, and of the noise there.
 constexpr double kShareMemory = 400.0;
 constexpr double kRecentMemory = 25.0;
 constexpr double kNoiseMemory = 1000.0;
@@ -27,20 +28,24 @@ constexpr double kLeastShare = 0.002;
 constexpr double kMostShare = 0.995;
 /// A square counts at most so many variances.
 constexpr double kSquareLimit = 60.0;
-/// Three sigma early, squared, and for how many messages it is remembered: late is nothing here.
+/// Three sigma early, squared, and for how many messages it is remembered: late
+/// is nothing here.
 constexpr double kPlainlyEarly = 9.0;
 constexpr int kEarlyMemory = 8;
 constexpr double kUnlikely = 0.1;
 /// Nats: none at the floor for so long is no chance (1e-6).
 constexpr double kTooDry = 14.0;
-/// Looks for another floor after an early message, after a dry run, after a jump.
+/// Looks for another floor after an early message, after a dry run, after a
+/// jump.
 constexpr int kLooksEarly = 2;
 constexpr int kLooksDry = 1;
-/// Start of the filters that hear the members of a fit once more, in units of its noise.
+/// Start of the filters that hear the members of a fit once more, in units of
+/// its noise.
 constexpr double kWideOffset = 1e4;
 constexpr double kWideRate = 1e2;
 constexpr int kForgottenAfter = 4;
-/// The noise of a line contains what the oscillator did; the filters tell the two apart.
+/// The noise of a line contains what the oscillator did; the filters tell the
+/// two apart.
 constexpr double kLeastPart = 0.05;
 constexpr double kMostPart = 1.5;
 
@@ -127,8 +132,8 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
   return in;
 }
 
-/// The watch has a picture of its own: all that is late is an outlier of any size. What is believed
-/// is asked under the same.
+/// The watch has a picture of its own: all that is late is an outlier of any
+/// size. What is believed is asked under the same.
 void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                                  const Bank::Innovations& in) noexcept {
   const OutlierPrior outliers{1.0 - path.share, kEarly};
@@ -228,7 +233,8 @@ void FloorEstimator::adopt(const FloorFit& fit) noexcept {
   weight_[best_] = 1.0;
   hear_members_again(fit);
   for (const Direction direction : kDirections) {
-    // The earliest of b messages is at the floor with probability 1 - (1 - w)^b.
+    // The earliest of b messages is at the floor with probability 1 - (1 -
+    // w)^b.
     const double entries = 1.0 / static_cast<double>(search_.stride());
     const double share = 1.0 - std::pow(1.0 - fit.noise[direction].share, entries);
     Path& path = paths_[direction];
@@ -245,8 +251,8 @@ void FloorEstimator::adopt(const FloorFit& fit) noexcept {
   process_ = bank_.mean_noise(weight_);
 }
 
-/// The line's noise includes what the oscillator did meanwhile. Heard once more, in order, the
-/// messages at the floor tell the two apart.
+/// The line's noise includes what the oscillator did meanwhile. Heard once
+/// more, in order, the messages at the floor tell the two apart.
 void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
   double last = 0.0;
   int heard = 0;
@@ -284,7 +290,7 @@ void FloorEstimator::take_from(const ModelBank<FullGrid>& bank, const Evidence<F
   const double units = scale * scale / (scale_ * scale_);
   for (std::size_t i = 0; i < FloorGrid::kSize; ++i) {
     Estimate e = bank.estimate(FloorGrid::kInFull[i]);
-    for (double* variance : {&e.xx, &e.xy, &e.xd, &e.yy, &e.yd, &e.dd}) *variance *= units;
+    e.rescale_covariance(units);
     bank_.set(i, e);
   }
   choose();
@@ -295,18 +301,17 @@ double FloorEstimator::noise_ns(Direction direction) const noexcept {
 }
 
 double FloorEstimator::offset_sigma_ns(double cycles) const noexcept {
-  const double h = std::max(0.0, cycles);
-  const double variance = mixed_.xx + 2.0 * h * mixed_.xy + h * h * mixed_.yy +
-                          process_.white_fm * h + process_.random_walk_fm * h * h * h / 3.0;
-  return scale_ * std::sqrt(std::max(variance, 0.0));
+  Estimate then = mixed_;
+  then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
+  return scale_ * std::sqrt(std::max(then.xx, 0.0));
 }
 
 double FloorEstimator::rate_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.yy); }
 double FloorEstimator::delay_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.dd); }
 
 void FloorEstimator::rescale_time(double factor) noexcept {
-  bank_.for_each([factor](Estimate& e) { estimation::rescale_time(e, factor); });
-  estimation::rescale_time(mixed_, factor);
+  bank_.for_each([factor](Estimate& e) { e.rescale_time(factor); });
+  mixed_.rescale_time(factor);
   jumps_.clear();
   search_.rescale_time(factor);
 }

@@ -13,16 +13,18 @@
 
 namespace ftcs::estimation {
 
-/// Offset, rate and delay where messages queue: a bank of Kalman filters under a density with an
-/// atom. Of the messages of each direction a share w waits for nothing and is known to r ns; the
-/// others wait, and how long is learnt:
+/// Offset, rate and delay where messages queue: a bank of Kalman filters under
+/// a density with an atom. Of the messages of each direction a share w waits
+/// for nothing and is known to r ns; the others wait, and how long is learnt:
 ///
-///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)      nu > 0;    early: e / (10 max(|nu|, 3 sqrt S))
-///     for T credit c = w N / p;   slope c nu / S;   curvature c / S
+///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)      nu > 0;    early: e / (10
+///     max(|nu|, 3 sqrt S)) for T credit c = w N / p;   slope c nu / S;
+///     curvature c / S
 ///
-/// While w is not tiny this reaches the filter that knows which messages waited: near the floor T
-/// is flat and thin, so that a message there is recognised as soon as the prediction is good. What
-/// it cannot do is begin; the start comes from FloorSearch.
+/// While w is not tiny this reaches the filter that knows which messages
+/// waited: near the floor T is flat and thin, so that a message there is
+/// recognised as soon as the prediction is good. What it cannot do is begin;
+/// the start comes from FloorSearch.
 class FloorEstimator {
  public:
   /// What the last message said of this picture.
@@ -36,8 +38,8 @@ class FloorEstimator {
   void restart() noexcept;
   void expect_noise_of_at_least(double ns) noexcept { least_noise_ = ns; }
 
-  /// `rate`: ns per cycle, believed elsewhere. Returns the probability that the message was at the
-  /// floor; 0 while none is known.
+  /// `rate`: ns per cycle, believed elsewhere. Returns the probability that the
+  /// message was at the floor; 0 while none is known.
   double update(const Observation& seen, double rate) noexcept;
   /// Only remembers it.
   void record(const Observation& seen, double rate) noexcept;
@@ -47,7 +49,8 @@ class FloorEstimator {
   [[nodiscard]] bool adopted() const noexcept { return adopted_; }
   /// Nats that spoke for that floor.
   [[nodiscard]] double evidence() const noexcept { return certainty_; }
-  /// Others, who have heard every message, say the same of this floor, and know it better.
+  /// Others, who have heard every message, say the same of this floor, and know
+  /// it better.
   void take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
                  double scale) noexcept;
   /// What is followed is not the floor: to be found anew.
@@ -81,7 +84,8 @@ class FloorEstimator {
     double variance = 1.0;      ///< r^2, ns^2
     double members = 0.0;       ///< messages at the floor behind the variance
     double heard = 0.0;
-    double dry = 0.0;  ///< nats: how unlikely it is that none of the last was at the floor
+    double dry = 0.0;  ///< nats: how unlikely it is that none of the last was at
+                       ///< the floor
     WaitDensity waits{};
   };
 

@@ -23,15 +23,15 @@ constexpr double kFewest = 5.0;
 constexpr std::size_t kCandidates = 48;
 /// Cycles between the two messages of an edge, at least.
 constexpr double kShortestEdge = 0.5;
-/// Within the width of a floor lie so many messages at least, and it is at most this part of the
-/// mean height.
+/// Within the width of a floor lie so many messages at least, and it is at most
+/// this part of the mean height.
 constexpr double kFewestInside = 6.0;
 constexpr double kWidest = 0.25;
 constexpr int kRounds = 8;
 /// The floor must be this much sharper than the waits are long.
 constexpr double kSharp = 1.0 / 12.0;
-/// Share at the floor in the newest third of a window, at least, as part of that in all of it: a
-/// path that changed leaves its old floor behind.
+/// Share at the floor in the newest third of a window, at least, as part of
+/// that in all of it: a path that changed leaves its old floor behind.
 constexpr double kLasting = 0.3;
 constexpr double kFewestMembers = 3.0;
 constexpr double kClear = 0.75;
@@ -141,8 +141,8 @@ class Fit {
     if (candidate.score > best_.score) best_ = candidate;
   }
 
-  /// ln likelihood of the best width: `inside` messages evenly within it, the others log-uniform or
-  /// exponential, whichever is likelier.
+  /// ln likelihood of the best width: `inside` messages evenly within it, the
+  /// others log-uniform or exponential, whichever is likelier.
   void score(const Counts& count, Candidate& candidate) const noexcept {
     const double log_unit = quick_log(kLogRange * smallest_);
     const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
@@ -189,7 +189,8 @@ class Fit {
            fit.estimate.d;
   }
 
-  /// One round of expectation and maximisation. False: nothing determines the line.
+  /// One round of expectation and maximisation. False: nothing determines the
+  /// line.
   [[nodiscard]] bool improve(FloorFit& fit) const noexcept {
     LineSums sums;
     double squares = 0.0;  // of z
@@ -204,7 +205,8 @@ class Fit {
         const double nu = innovation(fit, direction, m, time);
         double density = 0.0;
         const double credit = fit.noise[direction].at_floor(nu, density);
-        // Relative to the line so far: small numbers, whose squares lose nothing.
+        // Relative to the line so far: small numbers, whose squares lose
+        // nothing.
         const double left = sign_of(direction) * nu;
         sums.add(sign_of(direction), time, left, credit);
         squares += credit * nu * nu;
@@ -259,7 +261,8 @@ class Fit {
                 sigma < kSharp * wait;
   }
 
-  /// Nats by which the floor explains one direction better than waits without one.
+  /// Nats by which the floor explains one direction better than waits without
+  /// one.
   [[nodiscard]] double judge(FloorFit& fit, Direction direction, bool& lasting) const noexcept {
     const RecordWindow& window = windows_[direction];
     const double young = std::min(windows_.forward.time(windows_.forward[0]),

@@ -6,12 +6,15 @@
 
 namespace ftcs::estimation {
 
-/// Density of the delay of one direction above its floor, as a fit of few messages can know it:
+/// Density of the delay of one direction above its floor, as a fit of few
+/// messages can know it:
 ///
-///     p(nu) = w N(nu; 0, sigma^2) + (1 - w) (0.9 Exp(nu; tau) + 0.1 U(nu))     nu > 0
+///     p(nu) = w N(nu; 0, sigma^2) + (1 - w) (0.9 Exp(nu; tau) + 0.1 U(nu)) nu
+///     > 0
 ///
-/// w is the share of messages that wait for nothing, tau the mean wait of the others, U log-uniform
-/// over e^10. Early (nu < 0) there is 1e-4 U in place of the waits.
+/// w is the share of messages that wait for nothing, tau the mean wait of the
+/// others, U log-uniform over e^10. Early (nu < 0) there is 1e-4 U in place of
+/// the waits.
 struct FloorNoise {
   double share = 0.5;
   double sigma = 0.0;      ///< ns
@@ -28,8 +31,9 @@ struct FloorFit {
   Estimate estimate{};    ///< at `now` of the windows; covariances in units of sigma^2
   PerDirection<FloorNoise> noise{};
   PerDirection<double> members{};  ///< messages at the floor
-  /// Nats by which the floor explains the messages better than waits without one, of the direction
-  /// that has less; what the choice of three unknowns is worth is taken off.
+  /// Nats by which the floor explains the messages better than waits without
+  /// one, of the direction that has less; what the choice of three unknowns is
+  /// worth is taken off.
   double evidence = 0.0;
   double log_likelihood = 0.0;  ///< of all messages
   double said = 0.0;            ///< the same by the filters that heard them
@@ -37,18 +41,24 @@ struct FloorFit {
   [[nodiscard]] double sigma() const noexcept { return noise.forward.sigma; }
   /// Standard deviation of the offset, ns.
   [[nodiscard]] double offset_sigma_ns() const noexcept;
-  /// Of most messages of this direction nothing is late: its floor needs no proof.
+  /// Of most messages of this direction nothing is late: its floor needs no
+  /// proof.
   [[nodiscard]] bool clear(Direction direction) const noexcept;
 };
 
-/// Finds offset, rate and delay where messages queue, without any memory: the messages that waited
-/// for nothing lie on one line in each direction, and nothing lies before it.
+/// Finds offset, rate and delay where messages queue, without any memory: the
+/// messages that waited for nothing lie on one line in each direction, and
+/// nothing lies before it.
 ///
-/// 1. Candidates for the rate: the edges of the lower convex hulls of both directions (Andrew,
-///    Inf. Proc. Letters 9, 1979; for clocks: Moon, Skelly and Towsley, INFOCOM 1999).
-/// 2. For each, the messages' heights above both touching lines, by octaves: the best likelihood
+/// 1. Candidates for the rate: the edges of the lower convex hulls of both
+/// directions (Andrew,
+///    Inf. Proc. Letters 9, 1979; for clocks: Moon, Skelly and Towsley, INFOCOM
+///    1999).
+/// 2. For each, the messages' heights above both touching lines, by octaves:
+/// the best likelihood
 ///    of a share that lies evenly within a width, and waits beyond it.
-/// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line, sigma, shares and
+/// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line,
+/// sigma, shares and
 ///    mean wait under FloorNoise, from the best candidate.
 ///
 /// `least_noise`: no sigma is smaller, ns.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: messages of both directions at x + y t + sign (d + n), the floor's noise normal of 20 ns,
-// a share of them late by an exponential wait.
+// World: messages of both directions at x + y t + sign (d + n), the floor's
+// noise normal of 20 ns, a share of them late by an exponential wait.
 #include "ftcs/estimation/floor_fit.h"
 
 #include <cmath>

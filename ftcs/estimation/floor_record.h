@@ -37,8 +37,9 @@ struct RecordWindow {
   static constexpr double kUnitsPerCycle = 131072.0;  ///< 2^17: 32,768 cycles in 32 bits
 };
 
-/// Keeps one of every `stride` messages of each direction: the first that the filters believed at
-/// the floor of the delay, else the earliest by the believed rate. The last Capacity of them.
+/// Keeps one of every `stride` messages of each direction: the first that the
+/// filters believed at the floor of the delay, else the earliest by the
+/// believed rate. The last Capacity of them.
 template <std::size_t Capacity>
 class FloorRecord {
  public:
@@ -71,7 +72,8 @@ class FloorRecord {
     const RecordedMessage entry{message.z + message.rate * ahead, now(),
                                 static_cast<float>(message.said)};
     if (side.taken == 0) side.at_floor = false;
-    // The first one at the floor: the earliest of several there would be early by its noise.
+    // The first one at the floor: the earliest of several there would be early
+    // by its noise.
     const bool better = !side.at_floor && (message.at_floor || earlier(entry, side.best, message));
     if (side.taken == 0 || better) side.best = entry;
     side.at_floor = side.at_floor || message.at_floor;
@@ -96,13 +98,15 @@ class FloorRecord {
     return {side.ring.data(), Capacity, first, size, now()};
   }
 
-  /// Of two neighbours the earlier stays; from now on twice as many messages make an entry.
+  /// Of two neighbours the earlier stays; from now on twice as many messages
+  /// make an entry.
   void coarsen(double rate) noexcept {
     for (const Direction direction : kDirections) {
       Side& side = sides_[direction];
       const RecordWindow all = window(direction, Capacity);
       const Message at{direction, 0.0, 0.0, false, rate};
-      // In place: an entry is written at or before the place of the two it stands for.
+      // In place: an entry is written at or before the place of the two it
+      // stands for.
       const std::size_t kept = all.size / 2;
       for (std::size_t k = 0; k < kept; ++k) {
         const RecordedMessage& a = all[2 * k];
@@ -132,7 +136,8 @@ class FloorRecord {
       entry.time = after - static_cast<std::uint32_t>(static_cast<std::int64_t>(ago / factor));
     });
   }
-  /// What the filters say of each entry now: said(direction, cycles from now, z).
+  /// What the filters say of each entry now: said(direction, cycles from now,
+  /// z).
   template <class Said>
   void say(Said said) noexcept {
     for (const Direction direction : kDirections) {

@@ -15,23 +15,16 @@ constexpr std::uint32_t kLongestPause = 256;
 constexpr std::size_t kShortestWindow = 8;
 constexpr std::size_t kFewestEntries = 6;
 constexpr std::size_t kMostStride = 64;
-/// Nats of evidence, after what the choice of the line is worth: e^10 false floors to one.
+/// Nats of evidence, after what the choice of the line is worth: e^10 false
+/// floors to one.
 constexpr double kCertain = 10.0;
-/// Nats by which it must explain the messages better than filters that follow a floor did; and it
-/// must lie so many sigma off, or know so many times more.
+/// Nats by which it must explain the messages better than filters that follow a
+/// floor did; and it must lie so many sigma off, or know so many times more.
 constexpr double kGain = 20.0;
 constexpr double kOff = 5.0;
 /// An entry should be at the floor more often than not, and seldom twice.
 constexpr double kCoarseBelow = 0.35;
 constexpr double kFineAbove = 1.5;
-
-/// The line, `cycles` later.
-void elapse(Estimate& e, double cycles) noexcept {
-  e.x += e.y * cycles;
-  e.xx += 2.0 * cycles * e.xy + cycles * cycles * e.yy;
-  e.xy += cycles * e.yy;
-  e.xd += cycles * e.yd;
-}
 
 }  // namespace
 
@@ -50,7 +43,7 @@ void FloorSearch::restart() noexcept {
 void FloorSearch::hear(const Record::Message& message, double elapsed) noexcept {
   record_.elapse(elapsed);
   recent_.elapse(elapsed);
-  if (best_wanted_ > 0) elapse(best_.estimate, elapsed);
+  if (best_wanted_ > 0) best_.estimate.elapse(elapsed, {});
   (void)recent_.push({message.direction, message.z, message.said, false, message.rate});
   fresh_ = record_.push(message) || fresh_;
   ++messages_;
@@ -83,7 +76,8 @@ void FloorSearch::begin() noexcept {
   fresh_ = false;
 }
 
-/// True: wanted_ and in_recent_ say which. Windows grow until one holds all there is.
+/// True: wanted_ and in_recent_ say which. Windows grow until one holds all
+/// there is.
 bool FloorSearch::next_window() noexcept {
   const std::size_t longest = in_recent_ ? 64 : 128;
   const std::size_t held =

@@ -9,18 +9,21 @@
 
 namespace ftcs::estimation {
 
-/// Looks for a floor of the delays in what has come lately, a little at each message: long windows
-/// of the record lose to the oscillator's wander, short ones to noise; of those whose fit is
-/// certain the one that knows the offset best is taken.
+/// Looks for a floor of the delays in what has come lately, a little at each
+/// message: long windows of the record lose to the oscillator's wander, short
+/// ones to noise; of those whose fit is certain the one that knows the offset
+/// best is taken.
 ///
-/// Two records: every message, and one of every `stride`, where stride doubles while nothing is
-/// found, so that at least one of an entry's messages waited for nothing.
+/// Two records: every message, and one of every `stride`, where stride doubles
+/// while nothing is found, so that at least one of an entry's messages waited
+/// for nothing.
 class FloorSearch {
  public:
   using Record = FloorRecord<128>;
   using Recent = FloorRecord<64>;
 
-  /// What the filters that follow a floor already know, and how sure a new one must be.
+  /// What the filters that follow a floor already know, and how sure a new one
+  /// must be.
   struct Rival {
     bool there = false;
     double offset = 0.0;           ///< ns, at the last message
@@ -43,14 +46,16 @@ class FloorSearch {
   [[nodiscard]] const FloorFit& found() const noexcept { return best_; }
   /// One message of so many makes an entry of the record that the fit is from.
   [[nodiscard]] std::size_t stride() const noexcept;
-  /// The filters have started from it: calls hear(direction, cycles from now, z) for the messages
-  /// at its floor, in order of time, the last hundred at most.
+  /// The filters have started from it: calls hear(direction, cycles from now,
+  /// z) for the messages at its floor, in order of time, the last hundred at
+  /// most.
   template <class Hear>
   void each_member(Hear hear) const noexcept;
   /// Everything recorded is as the line that was found says.
   void adopt() noexcept;
 
-  /// ns per cycle, of the best candidate so far; nothing else may be known. 0: none.
+  /// ns per cycle, of the best candidate so far; nothing else may be known. 0:
+  /// none.
   [[nodiscard]] double rate() const noexcept { return rate_; }
   [[nodiscard]] bool has_rate() const noexcept { return has_rate_; }
   void rescale_time(double factor) noexcept;

@@ -10,14 +10,16 @@
 
 namespace ftcs::estimation {
 
-/// Learns how often the messages of each direction (0 forward, 1 backward) are outliers, and tells
-/// when there are too many in a row to be that: the gate opens.
+/// Learns how often the messages of each direction (0 forward, 1 backward) are
+/// outliers, and tells when there are too many in a row to be that: the gate
+/// opens.
 class Gate {
  public:
   enum class Verdict : std::uint8_t {
     kShut,
     kOpen,      ///< what was believed of this direction is in doubt
-    kCertain,   ///< the same, and this message is to be heard once more: the other direction fits
+    kCertain,   ///< the same, and this message is to be heard once more: the
+                ///< other direction fits
     kDiverged,  ///< nothing is as believed
   };
   /// Outliers that are expected before anything is known.
@@ -35,8 +37,8 @@ class Gate {
   /// Rejections in a row of the direction that has more.
   [[nodiscard]] int most_rejected() const noexcept { return std::max(rejected_[0], rejected_[1]); }
 
-  /// `credit`: probability that the message is no outlier. `since_change`: messages since a change
-  /// was followed.
+  /// `credit`: probability that the message is no outlier. `since_change`:
+  /// messages since a change was followed.
   [[nodiscard]] Verdict observe(std::size_t side, double credit, bool early,
                                 std::uint32_t since_change) noexcept {
     std::uint8_t& rejected = rejected_[side];
@@ -66,9 +68,10 @@ class Gate {
   static constexpr double kFewestOutliers = 0.001;
   static constexpr double kMostOutliers = 0.2;
   static constexpr double kRejected = 0.1;
-  /// Rejections in a row of one direction that cannot all be outliers: where the other one fits,
-  /// and outliers are rare or a change has just been followed; and elsewhere. Six of them have
-  /// raised the learnt probability by 0.11. Nor can more than were ever taken, from three on.
+  /// Rejections in a row of one direction that cannot all be outliers: where
+  /// the other one fits, and outliers are rare or a change has just been
+  /// followed; and elsewhere. Six of them have raised the learnt probability by
+  /// 0.11. Nor can more than were ever taken, from three on.
   static constexpr std::uint8_t kInARow = 6;
   static constexpr std::uint8_t kOnBadPath = 8;
   static constexpr std::uint8_t kAtLeast = 3;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: messages of two directions that are believed (credit 1) or not (credit 0), late unless
-// said otherwise; thousands of messages after the last change.
+// World: messages of two directions that are believed (credit 1) or not (credit
+// 0), late unless said otherwise; thousands of messages after the last change.
 #include "ftcs/estimation/gate.h"
 
 #include <gtest/gtest.h>

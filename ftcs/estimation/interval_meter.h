@@ -10,12 +10,14 @@
 
 namespace ftcs::estimation {
 
-/// The servo's unit of time: the interval between messages of one direction, in ns of reference
-/// time. It only has to be right within a factor of two or three, because the noise models stand
-/// decades apart; so it is kept until several intervals in a row contradict it.
+/// The servo's unit of time: the interval between messages of one direction, in
+/// ns of reference time. It only has to be right within a factor of two or
+/// three, because the noise models stand decades apart; so it is kept until
+/// several intervals in a row contradict it.
 ///
-/// Delay_Req leave at random, 0 to 2 intervals after one another (IEEE 1588-2019, 9.5.11.2), and
-/// bursts of them are usual: they count half, and a forward message in time outweighs them all.
+/// Delay_Req leave at random, 0 to 2 intervals after one another (IEEE
+/// 1588-2019, 9.5.11.2), and bursts of them are usual: they count half, and a
+/// forward message in time outweighs them all.
 class IntervalMeter {
  public:
   /// `configured_ns` zero: provisional until the first two forward messages.
@@ -48,8 +50,9 @@ class IntervalMeter {
     return factor;
   }
   [[nodiscard]] double interval_ns() const noexcept { return interval_ns_; }
-  /// Whether two messages of one direction are far enough apart to tell a rate: two Delay_Req a few
-  /// milliseconds apart, one of them late, are no reason to steer.
+  /// Whether two messages of one direction are far enough apart to tell a rate:
+  /// two Delay_Req a few milliseconds apart, one of them late, are no reason to
+  /// steer.
   [[nodiscard]] bool tells_rate() const noexcept {
     const double needed = interval_ns_ * kBaseline;
     return std::any_of(sides_.begin(), sides_.end(), [needed](const Side& side) {
@@ -69,11 +72,13 @@ class IntervalMeter {
     bool seen = false;
   };
   static constexpr double kProvisionalNs = 1e9;
-  /// No bus is faster; stamps closer than this are not two messages of a schedule.
+  /// No bus is faster; stamps closer than this are not two messages of a
+  /// schedule.
   static constexpr double kShortestNs = 1e3;
   static constexpr double kTolerance = 3.0;
   static constexpr double kBaseline = 0.125;
-  /// Four forward messages: a gap or a burst now and then is no change of schedule.
+  /// Four forward messages: a gap or a burst now and then is no change of
+  /// schedule.
   static constexpr int kEnough = 8;
   static constexpr int kEnoughAtFirst = 2;
 

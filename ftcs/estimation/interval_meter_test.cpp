@@ -34,7 +34,8 @@ TEST(IntervalMeter, takes_the_first_interval_of_forward_messages) {
 }
 
 TEST(IntervalMeter, does_not_take_a_burst_of_requests_for_a_faster_schedule) {
-  // Delay_Req leave at random within two intervals; five of them happened to leave in a row.
+  // Delay_Req leave at random within two intervals; five of them happened to
+  // leave in a row.
   Messages messages;
   for (int i = 0; i < 4; ++i) messages.forward(i);
   for (const double t : {3.2, 3.21, 3.25, 3.26, 3.27, 3.272}) {

@@ -9,22 +9,25 @@ namespace {
 
 /// An innovation below eight sigma needs no jump; squared.
 constexpr double kFar = 64.0;
-/// ln of the probability that a message brings a jump: one in a thousand. What counts is the
-/// certainty below; a rarer jump needs one more message.
+/// ln of the probability that a message brings a jump: one in a thousand. What
+/// counts is the certainty below; a rarer jump needs one more message.
 constexpr double kPrior = -7.0;
-/// Nats. No queue makes packets early, so that two messages, one of each direction, tell a jump of
-/// the offset from anything else. A longer path looks like two late packets, which are common.
+/// Nats. No queue makes packets early, so that two messages, one of each
+/// direction, tell a jump of the offset from anything else. A longer path looks
+/// like two late packets, which are common.
 constexpr double kCertainOffset = 13.0;
 constexpr double kCertainDelay = 40.0;
 /// One direction alone: late packets look like a jump of the offset, too.
 constexpr double kCertainAlone = 30.0;
-/// Jump or change of rate? Where messages follow each other closely both explain the same, and only
-/// what is usual remains to decide: oscillators do not change by more than some twenty times the
-/// noise in a cycle, clocks are stepped by anything. A factor of two around that counts six nats.
+/// Jump or change of rate? Where messages follow each other closely both
+/// explain the same, and only what is usual remains to decide: oscillators do
+/// not change by more than some twenty times the noise in a cycle, clocks are
+/// stepped by anything. A factor of two around that counts six nats.
 constexpr double kUsualRate = 20.0;
 constexpr double kSteepness = 8.0;
 constexpr double kMostPreference = 10.0;
-/// Share of late messages above which one of them says nothing of a jump's size.
+/// Share of late messages above which one of them says nothing of a jump's
+/// size.
 constexpr double kCommon = 0.2;
 /// Cycles since the last message: the rate may have changed well before it.
 constexpr double kUnnoticed = 0.5;
@@ -53,15 +56,7 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
 
 /// The oscillator wanders as the filters believe that it does.
 void JumpHypothesis::predict(const JumpMessage& message) noexcept {
-  const double t = message.seen.elapsed;
-  const double span = std::abs(t);
-  const double walk = message.process.random_walk_fm;
-  alive_ = filter_.predict(t, 0);
-  filter_.for_each([&](Estimate& e) {
-    e.xx += message.process.white_fm * span + walk * span * span * span / 3.0;
-    e.xy += walk * t * span / 2.0;
-    e.yy += walk * span;
-  });
+  alive_ = filter_.predict(message.seen.elapsed, 0, message.process);
 }
 
 void JumpHypothesis::judge(const JumpMessage& message) noexcept {
@@ -73,8 +68,8 @@ void JumpHypothesis::judge(const JumpMessage& message) noexcept {
   if (!filter_.healthy()) alive_ = false;
 }
 
-/// A jump of the offset makes one direction early; where late messages are common its size is to be
-/// read from that one.
+/// A jump of the offset makes one direction early; where late messages are
+/// common its size is to be read from that one.
 bool JumpHypothesis::may_start(const JumpMessage& message) const noexcept {
   if (message.distance < kFar) return false;
   const Estimate& e = message.believed;

@@ -9,8 +9,8 @@
 
 namespace ftcs::estimation {
 
-/// What the watch is told about one message: the message itself, what the filters take noise for,
-/// and what the best of them had believed before.
+/// What the watch is told about one message: the message itself, what the
+/// filters take noise for, and what the best of them had believed before.
 struct JumpMessage {
   Observation seen{};
   DelayShape shape{};
@@ -24,10 +24,11 @@ struct JumpMessage {
   double log_density = 0.0;  ///< of this message under it, outliers included
 };
 
-/// One hypothesis: offset or path delay has jumped between the last message that fitted and the
-/// first that did not. It starts from what was believed, with the variance nu^2 of that first
-/// message added to what has jumped, and goes on as a filter of its own; `lead` is what speaks for
-/// it, the logarithm of a likelihood ratio with the prior in it.
+/// One hypothesis: offset or path delay has jumped between the last message
+/// that fitted and the first that did not. It starts from what was believed,
+/// with the variance nu^2 of that first message added to what has jumped, and
+/// goes on as a filter of its own; `lead` is what speaks for it, the logarithm
+/// of a likelihood ratio with the prior in it.
 class JumpHypothesis {
  public:
   enum class Of : std::uint8_t { kOffset, kDelay };
@@ -41,7 +42,8 @@ class JumpHypothesis {
   [[nodiscard]] double lead() const noexcept { return lead_; }
   /// At the last message.
   [[nodiscard]] Estimate estimate() const noexcept { return filter_.estimate(0); }
-  /// Nats by which it is to be preferred to a change of rate that explains the same.
+  /// Nats by which it is to be preferred to a change of rate that explains the
+  /// same.
   [[nodiscard]] double preference() const noexcept { return preference_; }
   /// Enough speaks for it, and messages of both directions, where both come.
   [[nodiscard]] bool certain() const noexcept;
@@ -65,9 +67,9 @@ class JumpHypothesis {
   std::array<bool, 2> seen_{};  ///< a message of this direction fits
 };
 
-/// Tells jumps of the offset (a step of the reference or of the clock) and of the path delay from
-/// outliers and from changes of rate (Willsky and Jones, IEEE Trans. AC-21, 1976, with one start of
-/// each hypothesis at a time).
+/// Tells jumps of the offset (a step of the reference or of the clock) and of
+/// the path delay from outliers and from changes of rate (Willsky and Jones,
+/// IEEE Trans. AC-21, 1976, with one start of each hypothesis at a time).
 class JumpWatch {
  public:
   enum class Verdict : std::uint8_t {

@@ -13,8 +13,8 @@ namespace {
 
 using Verdict = JumpWatch::Verdict;
 
-/// A calm filter that knows offset 0, rate 0 and a path of 10 us, with 100 ns of noise; it takes
-/// everything far off for an outlier and keeps its opinion.
+/// A calm filter that knows offset 0, rate 0 and a path of 10 us, with 100 ns
+/// of noise; it takes everything far off for an outlier and keeps its opinion.
 class Calm {
  public:
   explicit Calm(bool two_way = true) : two_way_(two_way) {}
@@ -101,7 +101,8 @@ TEST(JumpWatch, forgets_an_outlier) {
 }
 
 TEST(JumpWatch, leaves_to_a_change_of_rate_what_is_as_usual_for_one) {
-  // 1 us, ten times the noise, within a cycle: one part per million at a second.
+  // 1 us, ten times the noise, within a cycle: one part per million at a
+  // second.
   Calm small;
   (void)small.message(Direction::kForward, 1.0, kPath - 1'000.0, 5.0);
   EXPECT_EQ(small.message(Direction::kBackward, 0.01, -kPath - 1'010.0, 25.0), Verdict::kNothing);

@@ -9,14 +9,16 @@
 
 namespace ftcs::estimation {
 
-/// Two numbers computed at once: the vector register that every 64-bit machine has (SSE2, NEON), by
-/// the vector types of gcc and clang. Each lane gets the bits that it would get alone, so that
-/// results do not depend on the machine. Compilers leave the loops of the bank scalar at -O2.
+/// Two numbers computed at once: the vector register that every 64-bit machine
+/// has (SSE2, NEON), by the vector types of gcc and clang. Each lane gets the
+/// bits that it would get alone, so that results do not depend on the machine.
+/// Compilers leave the loops of the bank scalar at -O2.
 using Pair = double __attribute__((vector_size(16)));
 using PairBits = std::uint64_t __attribute__((vector_size(16)));
 using Quad = float __attribute__((vector_size(16)));
 
-/// What `count` models are computed with: pairs, or one by one if their number is odd.
+/// What `count` models are computed with: pairs, or one by one if their number
+/// is odd.
 template <std::size_t count>
 struct LanesOf {
   using Type = double;
@@ -29,16 +31,16 @@ requires(count % 2 == 0) struct LanesOf<count> {
 template <class V>
 inline constexpr std::size_t kLanes = sizeof(V) / sizeof(double);
 
-/// V is double, Pair or Quad; `from` and `to` need no alignment.
+/// V is double, a vector or a struct of them; `from` and `to` need no alignment.
 template <class V, class Element>
 [[nodiscard]] inline V load(const Element* from) noexcept {
   V v;
-  std::memcpy(&v, from, sizeof v);
+  std::memcpy(static_cast<void*>(&v), from, sizeof v);
   return v;
 }
 template <class V, class Element>
 inline void store(Element* to, const V& v) noexcept {
-  std::memcpy(to, &v, sizeof v);
+  std::memcpy(static_cast<void*>(to), &v, sizeof v);
 }
 
 /// As std::min and std::max: the first if they are equal or not comparable.
@@ -66,6 +68,12 @@ template <class Mask>
 [[nodiscard]] inline Pair root(const Pair& v) noexcept {
   return Pair{std::sqrt(v[0]), std::sqrt(v[1])};
 }
+
+/// One lane of several; of a number alone there is one.
+[[nodiscard]] inline double lane_of(double v, std::size_t) noexcept { return v; }
+[[nodiscard]] inline double lane_of(const Pair& v, std::size_t i) noexcept { return v[i]; }
+inline void set_lane_of(double& v, std::size_t, double value) noexcept { v = value; }
+inline void set_lane_of(Pair& v, std::size_t i, double value) noexcept { v[i] = value; }
 
 /// One number of all lanes.
 [[nodiscard]] inline double total(double v) noexcept { return v; }

@@ -7,12 +7,14 @@
 
 namespace ftcs::estimation {
 
-/// Remembers for a few messages whether those of each direction came late or early against what was
-/// believed. An offset or a rate that has changed makes one direction late and the other early;
-/// nothing on a path makes a packet early, and a host that stands still makes both late.
+/// Remembers for a few messages whether those of each direction came late or
+/// early against what was believed. An offset or a rate that has changed makes
+/// one direction late and the other early; nothing on a path makes a packet
+/// early, and a host that stands still makes both late.
 class Lateness {
  public:
-  /// `distance`: nu^2 / S of a message of direction `side` (0 forward, 1 backward).
+  /// `distance`: nu^2 / S of a message of direction `side` (0 forward, 1
+  /// backward).
   void observe(std::size_t side, bool late, double distance) noexcept {
     for (Side& each : sides_) {
       if (each.remembered > 0 && --each.remembered == 0) each.sign = 0;
@@ -20,7 +22,8 @@ class Lateness {
     if (distance < kPlain) return;
     sides_[side] = {static_cast<std::int8_t>(late ? 1 : -1), kMemory};
   }
-  /// Whether a clock that changed can have brought it, both directions being there.
+  /// Whether a clock that changed can have brought it, both directions being
+  /// there.
   [[nodiscard]] bool speaks_of_clock() const noexcept {
     const int ahead = sides_[0].sign;
     const int back = sides_[1].sign;

@@ -7,13 +7,15 @@
 
 namespace ftcs::estimation {
 
-/// Weighted least squares of the messages' line z = x + y t + sign d: the normal equations
+/// Weighted least squares of the messages' line z = x + y t + sign d: the
+/// normal equations
 ///
 ///     [n  st  ss ] [x]   [sz ]
-///     [st stt sts] [y] = [stz]        sums over messages of weight w; s: sign, t: time in cycles
-///     [ss sts n  ] [d]   [ssz]
+///     [st stt sts] [y] = [stz]        sums over messages of weight w; s: sign,
+///     t: time in cycles [ss sts n  ] [d]   [ssz]
 ///
-/// and their inverse, the covariance of (x, y, d) in units of the noise's variance.
+/// and their inverse, the covariance of (x, y, d) in units of the noise's
+/// variance.
 struct LineSums {
   double n = 0.0, t = 0.0, s = 0.0, tt = 0.0, ts = 0.0, z = 0.0, tz = 0.0, sz = 0.0;
 
@@ -47,7 +49,8 @@ struct LineSums {
     return true;
   }
 
-  /// Offset and rate alone; d stays what it is in `e`, and has been taken off the readings.
+  /// Offset and rate alone; d stays what it is in `e`, and has been taken off
+  /// the readings.
   [[nodiscard]] bool solve_with_known_delay(Estimate& e) const noexcept {
     const double determinant = n * tt - t * t;
     if (!(determinant > 0.0)) return false;

@@ -9,9 +9,9 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Nats. One message counts at most kStep; a floor just found leads by what spoke for it, at most
-/// kHeadStart; above kBelieved it is followed until it falls below kDisbelieved, and below -kMost
-/// it is given up.
+/// Nats. One message counts at most kStep; a floor just found leads by what
+/// spoke for it, at most kHeadStart; above kBelieved it is followed until it
+/// falls below kDisbelieved, and below -kMost it is given up.
 constexpr double kStep = 8.0;
 constexpr double kHeadStart = 18.0;
 constexpr double kBelieved = 25.0;
@@ -20,14 +20,14 @@ constexpr double kMost = 60.0;
 /// Memory of q, and how near to certainty it may come.
 constexpr double kPartMemory = 20.0;
 constexpr double kLeastPart = 0.02;
-/// A floor that has been out of sight for so long that its offset is known to no more than this
-/// part of the mean wait would take waits for the floor.
+/// A floor that has been out of sight for so long that its offset is known to
+/// no more than this part of the mean wait would take waits for the floor.
 constexpr double kUseful = 1.0 / 16.0;
 /// Sigma of the fit within which the two pictures agree.
 constexpr double kAgree = 3.0;
-/// Four messages that the first picture explains and the second does not, while it is sharp, or two
-/// while it is much sharper; each that both explain takes half a one away, unless they are far
-/// apart.
+/// Four messages that the first picture explains and the second does not, while
+/// it is sharp, or two while it is much sharper; each that both explain takes
+/// half a one away, unless they are far apart.
 constexpr std::uint8_t kExplainedAlone = 8;
 constexpr double kSharp = 4.0;
 constexpr double kSharper = 32.0;
@@ -51,9 +51,9 @@ bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
   return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), noise);
 }
 
-/// Both say the same of the offset, and the first picture, which has heard everything, knows it no
-/// worse than the fit: to believe the floor then moves nothing, and what comes late from now on
-/// will not either.
+/// Both say the same of the offset, and the first picture, which has heard
+/// everything, knows it no worse than the fit: to believe the floor then moves
+/// nothing, and what comes late from now on will not either.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
@@ -62,9 +62,9 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
-/// Where messages wait the first picture is never as sharp as the waits are long, nor as it is
-/// wrong. If it is, and explains what the floor does not, or is much sharper than the floor, the
-/// floor is none.
+/// Where messages wait the first picture is never as sharp as the waits are
+/// long, nor as it is wrong. If it is, and explains what the floor does not, or
+/// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise =

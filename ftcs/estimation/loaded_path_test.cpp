@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// World: test/support/loaded_path.h, random-walk FM of 1e-9, jitter of 20 ns, frames of 120 us
-// (1,500 octets at 100 Mbit/s) unless said. Errors are true ones, over the last half, median and
-// worst of the seeds; the oracle is the same filter bank hearing only the messages that did not
-// wait.
+// World: test/support/loaded_path.h, random-walk FM of 1e-9, jitter of 20 ns,
+// frames of 120 us (1,500 octets at 100 Mbit/s) unless said. Errors are true
+// ones, over the last half, median and worst of the seeds; the oracle is the
+// same filter bank hearing only the messages that did not wait.
 #include "test/support/loaded_path.h"
 
 #include <algorithm>
@@ -106,7 +106,8 @@ TEST(LoadedPath, messages_that_wait_do_not_move_the_clock) {
   }
 }
 
-/// Largest error from half a second after the event on, and of the last third, worst of the seeds.
+/// Largest error from half a second after the event on, and of the last third,
+/// worst of the seeds.
 struct Change {
   const char* name;
   LoadedPathSpec spec;

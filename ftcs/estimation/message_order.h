@@ -12,9 +12,10 @@
 
 namespace ftcs::estimation {
 
-/// Decides whether a message is news: both clocks must have advanced since the last one of its
-/// direction. Late and repeated messages are refused, but not for ever: if refused messages
-/// themselves advance, a clock has been set back, and everything before is void.
+/// Decides whether a message is news: both clocks must have advanced since the
+/// last one of its direction. Late and repeated messages are refused, but not
+/// for ever: if refused messages themselves advance, a clock has been set back,
+/// and everything before is void.
 class MessageOrder {
  public:
   enum class Verdict : std::uint8_t { kNews, kDuplicate, kImplausible, kNewEpoch };
@@ -46,14 +47,16 @@ class MessageOrder {
     return older ? Verdict::kDuplicate : Verdict::kImplausible;
   }
   void reset() noexcept { *this = MessageOrder{}; }
-  /// Whether one clock has jumped against the other before the latest news: their advances since
-  /// the message before, of the same direction, differ by more than half.
+  /// Whether one clock has jumped against the other before the latest news:
+  /// their advances since the message before, of the same direction, differ by
+  /// more than half.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Variance that the steps of both clocks' stamps leave open, ns^2.
   [[nodiscard]] double tick_variance_ns2() const noexcept {
     return reference_tick_.variance_ns2() + free_running_tick_.variance_ns2();
   }
-  /// Noise that rounding makes in a message, ns: at least that of whole nanoseconds.
+  /// Noise that rounding makes in a message, ns: at least that of whole
+  /// nanoseconds.
   [[nodiscard]] double rounding_ns() const noexcept {
     return std::sqrt(reference_tick_.rounding_ns2() + free_running_tick_.rounding_ns2());
   }
@@ -70,7 +73,8 @@ class MessageOrder {
     bool seen = false;
     std::uint8_t refused = 0;
   };
-  /// Two messages may overtake each other on the way; three in order are a new epoch.
+  /// Two messages may overtake each other on the way; three in order are a new
+  /// epoch.
   static constexpr std::uint8_t kRefusals = 3;
 
   [[nodiscard]] static std::size_t index_of(Direction direction) noexcept {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: messages of both directions at irregular times; oracle is a textbook Kalman filter on
-// full 3 x 3 matrices, written without regard to speed.
+// World: messages of both directions at irregular times; oracle is a textbook
+// Kalman filter on full 3 x 3 matrices, written without regard to speed.
 #include "ftcs/estimation/model_bank.h"
 
 #include <array>
@@ -14,7 +14,8 @@ namespace {
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
-/// x, y, d with white FM a, random-walk FM b, delay walk w and noise of variance one (units of s).
+/// x, y, d with white FM a, random-walk FM b, delay walk w and noise of
+/// variance one (units of s).
 struct Textbook {
   std::array<double, 3> m{};
   Matrix p{};

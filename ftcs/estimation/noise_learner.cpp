@@ -10,39 +10,44 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Longest memory: shorter would cost accuracy, longer would not follow a change of load.
+/// Longest memory: shorter would cost accuracy, longer would not follow a
+/// change of load.
 constexpr double kMemory = 1000.0;
-/// A sample further from the median than this is an outlier for the purpose of learning, whatever
-/// the gate thinks: the gate's own judgement must not decide what noise looks like.
+/// A sample further from the median than this is an outlier for the purpose of
+/// learning, whatever the gate thinks: the gate's own judgement must not decide
+/// what noise looks like.
 constexpr double kAcceptSigmas = 12.0;
-/// Variance above this times the robust one: the moments belong to the past. A third of the
-/// deviation (9) happens by chance to a window of 32 once in half a million messages.
+/// Variance above this times the robust one: the moments belong to the past. A
+/// third of the deviation (9) happens by chance to a window of 32 once in half
+/// a million messages.
 constexpr double kStaleRatio = 16.0;
 constexpr double kSquareLimit = 60.0;
 /// Moments worth standardising by.
 constexpr double kShapeSamples = 16.0;
-/// Memory of the shape ratio in samples, and its bounds: one sample convinces nobody, and old
-/// certainty must not outlive a change.
+/// Memory of the shape ratio in samples, and its bounds: one sample convinces
+/// nobody, and old certainty must not outlive a change.
 constexpr double kShapeMemory = 300.0;
 constexpr double kShapeFloor = -15.0;
 constexpr double kShapeStep = -6.0;
 /// Share of outliers that the alternative to queueing assumes.
 constexpr double kOutliers = 0.1;
-/// The alternative is a crude picture of outliers: where it explains half of what a queue explains
-/// no queue is needed. Measured: queues lead by 0.2 nats a message, bursts never.
+/// The alternative is a crude picture of outliers: where it explains half of
+/// what a queue explains no queue is needed. Measured: queues lead by 0.2 nats
+/// a message, bursts never.
 constexpr double kDoubt = 2.0;
 /// One window's median and median deviation are too noisy to judge by.
 constexpr double kBodyMemory = 200.0;
 constexpr double kTailOn = 8.0;
-/// Nats beyond it that divide the doubt by e. Messages are not as independent as nats assume:
-/// bursts have led by a dozen.
+/// Nats beyond it that divide the doubt by e. Messages are not as independent
+/// as nats assume: bursts have led by a dozen.
 constexpr double kSureness = 16.0;
 constexpr double kTailOff = -12.0;
 
 double normal_log_density(double w) noexcept { return -0.5 * w * w - 0.9189385332046727; }
 
-/// Normal but for some late outliers of any size: what bursts and detours make of a path. Their
-/// moments look like queueing, but the floor of the delay is not where queueing would put it.
+/// Normal but for some late outliers of any size: what bursts and detours make
+/// of a path. Their moments look like queueing, but the floor of the delay is
+/// not where queueing would put it.
 double spoilt_log_density(double w) noexcept {
   const double outliers = w > 0.0 ? kOutliers / (10.0 * std::max(w, 3.0)) : 0.0;
   const double normal = quick_exp(std::max(normal_log_density(w), -700.0));

@@ -19,10 +19,11 @@ struct NoiseSample {
 
 /// Learns size and shape of the delay noise of one direction.
 ///
-/// Mean m1 and variance m2 of the innovations, by growing memory of at most 1,000 samples, each
-/// square scaled by R / (h P h' + R) so that the estimate's own error is not taken for noise.
-/// Whether part of it is queueing (late only) is decided by the likelihood ratio of three shapes
-/// against the normal one; the size of the tail then follows from m2: tail = k sqrt(m2).
+/// Mean m1 and variance m2 of the innovations, by growing memory of at most
+/// 1,000 samples, each square scaled by R / (h P h' + R) so that the estimate's
+/// own error is not taken for noise. Whether part of it is queueing (late only)
+/// is decided by the likelihood ratio of three shapes against the normal one;
+/// the size of the tail then follows from m2: tail = k sqrt(m2).
 template <std::size_t Window>
 class NoiseLearner {
  public:
@@ -32,7 +33,8 @@ class NoiseLearner {
   /// Returns whether the sample was taken.
   bool learn(const NoiseSample& sample, const DelayShape& shape) noexcept;
   void restart() noexcept { *this = NoiseLearner{}; }
-  /// The reference point of the delay moved by `shift` ns (mean to floor or back).
+  /// The reference point of the delay moved by `shift` ns (mean to floor or
+  /// back).
   void move_mean(double shift) noexcept {
     mean_ += shift;
     body_mean_ += static_cast<float>(shift);
@@ -42,10 +44,11 @@ class NoiseLearner {
   [[nodiscard]] double count() const noexcept { return count_; }
   [[nodiscard]] double variance() const noexcept { return variance_; }
   [[nodiscard]] bool has_tail() const noexcept { return has_tail_; }
-  /// Decides normal or late, with hysteresis, and returns the shape in ns (scale 1).
+  /// Decides normal or late, with hysteresis, and returns the shape in ns
+  /// (scale 1).
   [[nodiscard]] DelayShape decide() noexcept;
-  /// Probability, roughly, that a learnt tail is none, and the floor of the delay not where it
-  /// says.
+  /// Probability, roughly, that a learnt tail is none, and the floor of the
+  /// delay not where it says.
   [[nodiscard]] double tail_doubt() const noexcept;
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// World: innovations of a filter that is nearly exact, so that they are the delay noise itself.
+// World: innovations of a filter that is nearly exact, so that they are the
+// delay noise itself.
 #include "ftcs/estimation/noise_learner.h"
 
 #include <cmath>

@@ -6,8 +6,9 @@
 
 namespace ftcs::estimation {
 
-/// One hypothesis of how clock and path wander. Dimensionless: variances in units of s^2 (s = noise
-/// of one timestamp), time in cycles (one sync interval).
+/// One hypothesis of how clock and path wander. Dimensionless: variances in
+/// units of s^2 (s = noise of one timestamp), time in cycles (one sync
+/// interval).
 struct NoiseModel {
   double white_fm = 0.0;        ///< a: variance added to the offset per cycle
   double random_walk_fm = 0.0;  ///< b: variance added to the rate (per cycle) per cycle
@@ -24,10 +25,10 @@ template <std::size_t size>
   return values;
 }
 
-/// The full bank, ordered from calm to wild: a model may take over the state of any model behind
-/// it. Random-walk FM by decades: the gain of a filter goes with b^(1/4), so that half a decade off
-/// costs below one per cent. White FM matters only above sqrt(b); there the gain goes with
-/// a^(1/2).
+/// The full bank, ordered from calm to wild: a model may take over the state of
+/// any model behind it. Random-walk FM by decades: the gain of a filter goes
+/// with b^(1/4), so that half a decade off costs below one per cent. White FM
+/// matters only above sqrt(b); there the gain goes with a^(1/2).
 struct FullGrid {
   static constexpr std::size_t kResidualWindow = 32;  ///< innovations behind the robust scale
   static constexpr std::size_t kNoiseWindow = 32;     ///< of the noise learner, per direction
@@ -53,13 +54,15 @@ struct FullGrid {
   }};
 };
 
-/// Beside the full bank, for the messages that wait for nothing on a path where others queue. They
-/// are few, and tell less finely how the oscillator wanders: half of the full bank's models.
+/// Beside the full bank, for the messages that wait for nothing on a path where
+/// others queue. They are few, and tell less finely how the oscillator wanders:
+/// half of the full bank's models.
 struct FloorGrid {
   static constexpr std::size_t kSize = 14;
   static constexpr std::size_t kStart = 6;
   static constexpr std::size_t kFavoured = 1;
-  /// Twice nats for the one that stands for seven nearly constant ones of the full bank: 2 ln 7.
+  /// Twice nats for the one that stands for seven nearly constant ones of the
+  /// full bank: 2 ln 7.
   static constexpr double kCalmFavour = 3.9;
   static constexpr std::size_t kSudden = 13;
   /// Their places in the full bank.
@@ -76,8 +79,9 @@ struct FloorGrid {
   ();
 };
 
-/// For microcontrollers: three models four decades apart, the gate and the detection of changes,
-/// but neither learnt noise shapes nor a second opinion. What that costs: docs/adaptive-servo.md.
+/// For microcontrollers: three models four decades apart, the gate and the
+/// detection of changes, but neither learnt noise shapes nor a second opinion.
+/// What that costs: docs/adaptive-servo.md.
 struct SmallGrid {
   static constexpr std::size_t kResidualWindow = 8;
   static constexpr std::size_t kNoiseWindow = 0;

@@ -8,8 +8,9 @@
 
 namespace ftcs::estimation {
 
-/// Logarithm and exponential for evidence, where a nat more or less decides: no table, no branch,
-/// the same bits on every machine, and as many at once as V (double or Pair) has lanes.
+/// Logarithm and exponential for evidence, where a nat more or less decides: no
+/// table, no branch, the same bits on every machine, and as many at once as V
+/// (double or Pair) has lanes.
 namespace quick {
 
 template <class V>
@@ -27,10 +28,11 @@ inline constexpr double kLn2 = 0.6931471805599453;
 
 }  // namespace quick
 
-/// Natural logarithm of a positive, finite, normal number; relative error of the argument below
-/// 1e-9.
+/// Natural logarithm of a positive, finite, normal number; relative error of
+/// the argument below 1e-9.
 ///
-/// x = m 2^e with sqrt(1/2) <= m < sqrt(2); ln m = 2 artanh t, t = (m - 1) / (m + 1), |t| < 0.172.
+/// x = m 2^e with sqrt(1/2) <= m < sqrt(2); ln m = 2 artanh t, t = (m - 1) / (m
+/// + 1), |t| < 0.172.
 template <class V>
 [[nodiscard]] inline V quick_log(const V& x) noexcept {
   using Bits = quick::Bits<V>;
@@ -39,7 +41,8 @@ template <class V>
   constexpr std::uint64_t kBias = 1023ULL << 52U;
   constexpr std::uint64_t kTwo52 = 0x4330000000000000ULL;  // bits of 2^52
   const Bits bits = std::bit_cast<Bits>(x) - kSqrtHalf;
-  // An integer below 2^52 in the mantissa of 2^52 is that number once 2^52 is taken off.
+  // An integer below 2^52 in the mantissa of 2^52 is that number once 2^52 is
+  // taken off.
   const V biased = std::bit_cast<V>(((bits + kBias) >> 52U) | kTwo52);
   const V exponent = biased - (4503599627370496.0 + 1023.0);
   const V m = std::bit_cast<V>((bits & kMantissa) + kSqrtHalf);
@@ -49,9 +52,11 @@ template <class V>
   return exponent * quick::kLn2 + 2.0 * t * series;
 }
 
-/// Exponential; relative error below 1e-8. Valid: |x| <= 700; beyond, any number may come out.
+/// Exponential; relative error below 1e-8. Valid: |x| <= 700; beyond, any
+/// number may come out.
 ///
-/// x = n ln 2 + r, |r| <= ln 2 / 2: 2^n through the exponent bits, e^r by its series.
+/// x = n ln 2 + r, |r| <= ln 2 / 2: 2^n through the exponent bits, e^r by its
+/// series.
 template <class V>
 [[nodiscard]] inline V quick_exp(const V& x) noexcept {
   using Bits = quick::Bits<V>;

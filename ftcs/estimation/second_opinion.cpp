@@ -14,12 +14,15 @@ namespace {
 
 /// Concentration steps per start: convergence is that fast on a line.
 constexpr int kSteps = 3;
-/// No fit leaves much less than the roughness, which is the larger part of the noise; where
-/// innovations are below this part of the contradiction times the roughness, save the work.
+/// No fit leaves much less than the roughness, which is the larger part of the
+/// noise; where innovations are below this part of the contradiction times the
+/// roughness, save the work.
 constexpr double kWorth = 0.8;
-/// Cycles. No line is worth fitting across it, and the times before would cost digits.
+/// Cycles. No line is worth fitting across it, and the times before would cost
+/// digits.
 constexpr double kLongestGap = 1e5;
-/// Innovations of one direction that differ by less than this part are no noise.
+/// Innovations of one direction that differ by less than this part are no
+/// noise.
 constexpr double kSameInnovation = 0.25;
 constexpr double kFullFreedom = 9.0;
 /// Of one direction: so many in a row cannot all be outliers.
@@ -31,8 +34,9 @@ constexpr std::size_t kLeastFreedom = 3;
 /// A fit may be exact (simulated or coarse stamps); the noise is not.
 constexpr double kSmallestScale = 1e-4;
 
-/// Brings the `wanted` smallest of `count` values to the front, in order. For the few values here
-/// selection is as quick as anything, and needs nothing of a C library (std::nth_element: memmove).
+/// Brings the `wanted` smallest of `count` values to the front, in order. For
+/// the few values here selection is as quick as anything, and needs nothing of
+/// a C library (std::nth_element: memmove).
 template <class Value, class Less>
 void smallest_first(Value* values, std::size_t count, std::size_t wanted, Less less) noexcept {
   for (std::size_t k = 0; k < wanted; ++k) {
@@ -44,8 +48,8 @@ void smallest_first(Value* values, std::size_t count, std::size_t wanted, Less l
   }
 }
 
-/// The value of the given rank among the first `count`, which are reordered; infinite if there are
-/// none.
+/// The value of the given rank among the first `count`, which are reordered;
+/// infinite if there are none.
 template <std::size_t Capacity>
 double ranked(std::array<double, Capacity>& values, std::size_t count, std::size_t rank) noexcept {
   if (count == 0) return std::numeric_limits<double>::infinity();
@@ -103,8 +107,8 @@ LastMessages SecondOpinion<Capacity>::last() const noexcept {
   return last;
 }
 
-/// Least squares of z on (1, t, sign), time relative to the newest message; covariance in units of
-/// the squared residual scale.
+/// Least squares of z on (1, t, sign), time relative to the newest message;
+/// covariance in units of the squared residual scale.
 template <std::size_t Capacity>
 Estimate SecondOpinion<Capacity>::fit(const Kept& kept, bool delay_free,
                                       double known_delay) const noexcept {
@@ -119,8 +123,8 @@ Estimate SecondOpinion<Capacity>::fit(const Kept& kept, bool delay_free,
   return solved ? e : Estimate{};
 }
 
-/// The line through two messages of one direction; the delay from the median of what is left on the
-/// other side.
+/// The line through two messages of one direction; the delay from the median of
+/// what is left on the other side.
 template <std::size_t Capacity>
 Estimate SecondOpinion<Capacity>::through(std::size_t a, std::size_t b, bool delay_free,
                                           double known_delay) const noexcept {
@@ -144,8 +148,9 @@ Estimate SecondOpinion<Capacity>::through(std::size_t a, std::size_t b, bool del
   return line;
 }
 
-/// Three quarters of the messages of each direction, those closest to the line: each direction by
-/// itself, because a loaded one would otherwise lend its messages to the trimming of the other.
+/// Three quarters of the messages of each direction, those closest to the line:
+/// each direction by itself, because a loaded one would otherwise lend its
+/// messages to the trimming of the other.
 template <std::size_t Capacity>
 typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
     const Estimate& line) const noexcept {
@@ -171,8 +176,8 @@ typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
   return kept;
 }
 
-/// Size of the innovations of one direction. Typical is infinite for a direction that is not there,
-/// least is zero for one of few messages.
+/// Size of the innovations of one direction. Typical is infinite for a
+/// direction that is not there, least is zero for one of few messages.
 template <std::size_t Capacity>
 typename SecondOpinion<Capacity>::Sizes SecondOpinion<Capacity>::innovations(
     double sign) const noexcept {
@@ -188,7 +193,8 @@ typename SecondOpinion<Capacity>::Sizes SecondOpinion<Capacity>::innovations(
   return {ranked(sizes, count, count / 2), count < kManyMessages ? 0.0 : least};
 }
 
-/// Root mean square of what `line` leaves of the kept messages of one direction.
+/// Root mean square of what `line` leaves of the kept messages of one
+/// direction.
 template <std::size_t Capacity>
 double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
                                         double sign) const noexcept {
@@ -204,8 +210,9 @@ double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
   return std::max(kSmallestScale, std::sqrt(squares / std::max(members, 1.0)));
 }
 
-/// Distance of a message from the chord of its neighbours of the same direction, lower quartile:
-/// noise without any model. One outlier spoils three chords, hence not the median.
+/// Distance of a message from the chord of its neighbours of the same
+/// direction, lower quartile: noise without any model. One outlier spoils three
+/// chords, hence not the median.
 template <std::size_t Capacity>
 double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
   std::array<double, Capacity> distances{};
@@ -225,13 +232,14 @@ double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
   return count == 0 ? 0.0 : ranked(distances, count, count / 4);
 }
 
-/// Innovations far above `forward` and `backward`: the typical ones of both directions, or one that
-/// is merely loaded would do; or all of one direction.
+/// Innovations far above `forward` and `backward`: the typical ones of both
+/// directions, or one that is merely loaded would do; or all of one direction.
 template <std::size_t Capacity>
 bool SecondOpinion<Capacity>::contradicted(double forward, double backward) const noexcept {
   const Sizes ahead = innovations(1.0);
   const Sizes back = innovations(-1.0);
-  // Coarse stamps of one direction can agree to the digit: it must not set the measure for itself.
+  // Coarse stamps of one direction can agree to the digit: it must not set the
+  // measure for itself.
   const double one_sided = kOneSided * std::max(forward, backward);
   return (ahead.typical > forward && back.typical > backward) || ahead.least > one_sided ||
          back.least > one_sided;
@@ -247,7 +255,8 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
   Kept best_kept;
-  // Elemental starts: every message with the one that is half a window later, if of one direction.
+  // Elemental starts: every message with the one that is half a window later,
+  // if of one direction.
   for (std::size_t a = 0; a < size_; ++a) {
     const std::size_t b = (a + size_ / 2) % size_;
     if (a >= b || messages_[a].sign != messages_[b].sign ||

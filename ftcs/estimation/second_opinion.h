@@ -10,10 +10,11 @@
 
 namespace ftcs::estimation {
 
-/// What a fresh fit of the last messages says: offset, rate and delay at the newest of them, with
-/// covariances in units of scale^2.
+/// What a fresh fit of the last messages says: offset, rate and delay at the
+/// newest of them, with covariances in units of scale^2.
 struct FreshFit {
-  bool better = false;  ///< it contradicts the filters and is far more precise than they are
+  bool better = false;  ///< it contradicts the filters and is far more precise
+                        ///< than they are
   Estimate estimate{};
   double scale_ns = 0.0;
 };
@@ -21,8 +22,8 @@ struct FreshFit {
 struct OpinionQuestion {
   bool delay_free = true;  ///< estimate d too; otherwise it is
   double known_delay = 0.0;
-  /// The fit is better if it leaves residuals so many times below the innovations; with few
-  /// messages more is needed.
+  /// The fit is better if it leaves residuals so many times below the
+  /// innovations; with few messages more is needed.
   double contradiction = 10.0;
 };
 
@@ -32,27 +33,31 @@ struct LastMessages {
   std::size_t count = 0;
 };
 
-/// Keeps the last messages and, now and then, fits them anew without any memory:
+/// Keeps the last messages and, now and then, fits them anew without any
+/// memory:
 ///
-///     z = x + y t + sign d,   least trimmed squares over three quarters of them
-///     (Rousseeuw, J. Am. Stat. Assoc. 79, 1984; concentration steps from elemental starts)
+///     z = x + y t + sign d,   least trimmed squares over three quarters of
+///     them (Rousseeuw, J. Am. Stat. Assoc. 79, 1984; concentration steps from
+///     elemental starts)
 ///
-/// Filters that have swallowed a gross error (a spike among the first messages, a jump, hostile
-/// input) take the size of their errors for noise and trust new messages too little. If the fit
-/// leaves residuals far below the filters' own innovations they must start again, from the fit.
+/// Filters that have swallowed a gross error (a spike among the first messages,
+/// a jump, hostile input) take the size of their errors for noise and trust new
+/// messages too little. If the fit leaves residuals far below the filters' own
+/// innovations they must start again, from the fit.
 template <std::size_t Capacity>
 class SecondOpinion {
  public:
   void push(const Observation& seen, double innovation) noexcept;
   /// Whether all its places are taken.
   [[nodiscard]] bool full() const noexcept { return size_ == Capacity; }
-  /// How many innovations in a row, of either direction, hardly differ from their predecessor:
-  /// noise is not like that.
+  /// How many innovations in a row, of either direction, hardly differ from
+  /// their predecessor: noise is not like that.
   [[nodiscard]] int serial() const noexcept { return std::max(alike_[0], alike_[1]); }
   [[nodiscard]] FreshFit consult(const OpinionQuestion& question) const noexcept;
   /// The last messages, the newest last.
   [[nodiscard]] LastMessages last() const noexcept;
-  /// The filters start again from `line`: what they had thought of these messages is void.
+  /// The filters start again from `line`: what they had thought of these
+  /// messages is void.
   void adopt(const Estimate& line) noexcept;
   void clear() noexcept { *this = SecondOpinion{}; }
   /// The unit of time becomes `factor` times as long.

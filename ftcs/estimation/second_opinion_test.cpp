@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// World: messages of both directions in turn, twice a cycle, on a line of known offset, rate and
-// path delay, with normal noise of 100 ns; innovations are what some filter thought of them.
+// World: messages of both directions in turn, twice a cycle, on a line of known
+// offset, rate and path delay, with normal noise of 100 ns; innovations are
+// what some filter thought of them.
 #include "ftcs/estimation/second_opinion.h"
 
 #include <cmath>
@@ -45,8 +46,8 @@ TEST_F(SecondOpinionTest, finds_the_line_under_outliers_when_the_filters_are_los
 TEST_F(SecondOpinionTest, covariance_is_that_of_least_squares) {
   for (int i = 0; i < 16; ++i) feed(0.0, 2e4);
   const FreshFit fit = opinion_.consult({true, 0.0});
-  // Six of eight messages a direction are kept. Newest point of a line through N uniform points:
-  // variance about 4 / N; the delay: 1 / N.
+  // Six of eight messages a direction are kept. Newest point of a line through
+  // N uniform points: variance about 4 / N; the delay: 1 / N.
   EXPECT_NEAR(fit.estimate.xx, 4.0 / 12.0, 0.2);
   EXPECT_NEAR(fit.estimate.dd, 1.0 / 12.0, 0.03);
   EXPECT_GT(fit.estimate.yy, 0.0);

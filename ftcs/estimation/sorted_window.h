@@ -7,8 +7,9 @@
 
 namespace ftcs::estimation {
 
-/// The last `Capacity` values and the same values in order, so that a median costs a look-up and a
-/// new value at most `Capacity` moves. Single precision: it holds noise samples near zero.
+/// The last `Capacity` values and the same values in order, so that a median
+/// costs a look-up and a new value at most `Capacity` moves. Single precision:
+/// it holds noise samples near zero.
 template <std::size_t Capacity>
 class SortedWindow {
  public:
@@ -40,8 +41,8 @@ class SortedWindow {
   /// Upper median. Valid: size() > 0.
   [[nodiscard]] double median() const noexcept { return static_cast<double>(sorted_[size_ / 2]); }
 
-  /// Median distance from the median: the two runs left and right of the median are merged from the
-  /// inside outwards. Valid: size() > 0.
+  /// Median distance from the median: the two runs left and right of the median
+  /// are merged from the inside outwards. Valid: size() > 0.
   [[nodiscard]] double median_deviation() const noexcept {
     const float centre = sorted_[size_ / 2];
     std::size_t left = size_ / 2;       // next candidate on the left is left - 1

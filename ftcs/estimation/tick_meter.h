@@ -8,12 +8,13 @@
 
 namespace ftcs::estimation {
 
-/// The step of a clock's timestamps: what all their differences are multiples of. A stamp is wrong
-/// by up to a step, and where the noise is smaller than that no averaging shows it.
+/// The step of a clock's timestamps: what all their differences are multiples
+/// of. A stamp is wrong by up to a step, and where the noise is smaller than
+/// that no averaging shows it.
 ///
-/// Stamps of a nanosecond or less are taken for exact. So are steps above `kCoarsest`: they are the
-/// schedule of messages that leave on time, not the clock. Messages more than four seconds apart
-/// tell nothing here.
+/// Stamps of a nanosecond or less are taken for exact. So are steps above
+/// `kCoarsest`: they are the schedule of messages that leave on time, not the
+/// clock. Messages more than four seconds apart tell nothing here.
 class TickMeter {
  public:
   void observe(std::uint64_t difference_ns) noexcept {

@@ -9,16 +9,18 @@
 
 namespace ftcs::estimation {
 
-/// Learnt density of the waits of one direction: a histogram in half octaves from 1 ns to 16 ms;
-/// longer waits count as these.
+/// Learnt density of the waits of one direction: a histogram in half octaves
+/// from 1 ns to 16 ms; longer waits count as these.
 ///
-/// It starts as an exponential of the mean wait that the fit has found. Neighbouring cells that
-/// have seen too little share one density, the first of them down to zero: short waits are even,
-/// since a message comes in the middle of a frame as often as at its end.
+/// It starts as an exponential of the mean wait that the fit has found.
+/// Neighbouring cells that have seen too little share one density, the first of
+/// them down to zero: short waits are even, since a message comes in the middle
+/// of a frame as often as at its end.
 class WaitDensity {
  public:
   void start(double mean_wait_ns) noexcept;
-  /// A message that was late by nu > 0 ns and waited with the given probability.
+  /// A message that was late by nu > 0 ns and waited with the given
+  /// probability.
   void learn(double nu, double waited) noexcept;
   /// 1/ns, of a wait of nu > 0 ns.
   [[nodiscard]] double at(double nu) const noexcept {
@@ -28,7 +30,8 @@ class WaitDensity {
  private:
   static constexpr std::size_t kCells = 48;
 
-  /// Two cells an octave; the exponent and the first bit of the mantissa of nu^2 tell which.
+  /// Two cells an octave; the exponent and the first bit of the mantissa of
+  /// nu^2 tell which.
   [[nodiscard]] static std::size_t cell_of(double nu) noexcept {
     if (!(nu > 1.0)) return 0;
     const auto exponent = static_cast<std::size_t>(std::bit_cast<std::uint64_t>(nu * nu) >> 52U);
