@@ -7,6 +7,8 @@
 # make bench      nanoseconds and instructions per update, allocations
 # make check      formatting, spelling, layers; make check-tidy: clang-tidy too
 # make fuzz       each fuzz target for FUZZ_SECONDS
+# make docs       the guides as a site with search in build-docs/
+# make deb        Debian packages of this commit in build-deb/
 # make mutate     flip signs and comparisons one at a time; every mutant must fail a test
 
 CMAKE_FLAGS ?=
@@ -17,7 +19,7 @@ JOB ?=
 VM_LABEL ?= vm
 VM_FLAGS ?=
 
-.PHONY: all configure build demo test test-all test-embedded test-vm bench check check-tidy fuzz mutate deps deps-test clean
+.PHONY: all configure build demo test test-all test-embedded test-vm bench check check-tidy fuzz mutate docs deb deps deps-test clean
 
 all: build
 
@@ -62,6 +64,15 @@ bench: deps-test
 	@build-release/bin/analysis_bench
 	@build-release/bin/sim_bench
 	@bench/instructions.sh build-release
+
+docs:
+	@tools/install-deps docs
+	@mkdocs build --quiet --strict
+	@echo "build-docs/index.html"
+
+deb:
+	@tools/install-deps build package
+	@tools/make-deb
 
 check: deps-test configure
 	@tools/check

@@ -52,6 +52,7 @@ int PtpPort::run() {
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
   while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
+  service_.stopping();
   if (real_clock_ != nullptr) {
     real_clock_->stop();
     if (!failure_) failure_ = real_clock_->refusal();

@@ -17,6 +17,7 @@
 #include "ftcs/daemon/port_data_sets.h"
 #include "ftcs/daemon/ptp_options.h"
 #include "ftcs/daemon/real_clock.h"
+#include "ftcs/daemon/service_report.h"
 #include "ftcs/daemon/time_feed.h"
 #include "ftcs/platform/ptp_transport.h"
 #include "ftcs/platform/stop_flag.h"
@@ -88,6 +89,7 @@ class PtpPort : private platform::TransportHandler {
   }
   /// Who says what may steer a real clock; null: the clock is virtual.
   [[nodiscard]] node::ReferenceGate* gate() { return real_clock_; }
+  [[nodiscard]] ServiceReport& service() { return service_; }
   /// Null: the clock is virtual.
   [[nodiscard]] RealClock* real_clock() { return real_clock_; }
   [[nodiscard]] const PtpOptions& options() const { return options_; }
@@ -126,6 +128,7 @@ class PtpPort : private platform::TransportHandler {
   bool stamp_missed_ = false;
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take
+  ServiceReport service_{};
   std::optional<std::string> failure_{};
 };
 

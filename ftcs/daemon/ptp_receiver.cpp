@@ -134,6 +134,7 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   node_.on_silence(now);
   take_events(now);
   record_.follow_lock(now);
+  service().turn(now, node_.locked(), [this] { return service_sentence(); });
   if (real_clock() != nullptr) {
     const ClockDiscipline& discipline = node_.discipline();
     if (const auto wrong = real_clock()->attend(discipline.counters().commands > 0,
@@ -149,6 +150,19 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
     looked_for_missing_ = true;
     if (log_missing(LogLevel::kWarning)) log_unusual(node_.port().counters());
   }
+}
+
+std::string PtpReceiver::service_sentence() const {
+  if (!had_transmitter_) {
+    return fmt::format("not locked: no time transmitter was heard on {}, domain {}",
+                       options().interface, options().domain);
+  }
+  const ServoSnapshot& seen = node_.discipline().latest().servo;
+  if (!seen.offset_known)
+    return "not locked: a time transmitter announces, the path delay is not known yet";
+  return fmt::format("{}: offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
+                     node_.locked() ? "locked" : "not locked", seen.offset.ns(),
+                     seen.path_delay.ns(), node_.discipline().latest().tracking_rate.ppb());
 }
 
 // Before the next sample, which would be seconds off. The clock is never stepped for it.

@@ -46,6 +46,7 @@ class PtpReceiver final : public PtpPort, private Managed {
   void take(const node::ReceiverEvent& event, FreeRunningTime now);
   void tell(const ptp::Action& action);
   void on_selected(const ptp::TransmitterSelected& selected);
+  [[nodiscard]] std::string service_sentence() const;
   void follow_scale_change();
   /// True if there was something to say.
   bool log_missing(LogLevel level);

@@ -125,6 +125,7 @@ void MainRunner::run(const std::function<bool()>& stop) {
 
 /// They shall not find out by their watchdogs.
 void MainRunner::stop_drives() {
+  service_.stopping();
   node_->stop();
   while (!node_->stopped()) exchange();
 }
@@ -138,6 +139,8 @@ void MainRunner::cycle() {
                                  HostClock::now() + Duration::from_whole_ns(limit));
   node_->end_cycle(answered, stamps_, HostClock::now());
   watch_.note(*node_, HostClock::now());
+  service_.turn(HostClock::now(), decision().state == CycleState::kLocked,
+                [this] { return service_sentence(); });
   if (csv_.is_open()) {
     csv_.write(figures().cycles, *node_);
   }
@@ -152,6 +155,15 @@ void MainRunner::cycle() {
 std::optional<ReferenceTime> MainRunner::plant_now(FreeRunningTime now) {
   const bool wanted = plant_ && options_.bus_write != node::BusWrite::kOffset;
   return wanted ? plant_->at(now) : std::nullopt;
+}
+
+std::string MainRunner::service_sentence() const {
+  const ethercat::CycleReport& report = main().last_cycle();
+  const bool locked = decision().state == CycleState::kLocked;
+  return fmt::format("{}{}: phase {:+.3f} us, margin {:.1f} us, working counter {} of {}",
+                     locked ? "" : "not locked, ", name(decision().state),
+                     decision().phase_error.ns() * 1e-3, figures().margin.quantile(0.5) * 1e-3,
+                     report.working_counter, report.expected);
 }
 
 void MainRunner::print_live() const {

@@ -8,6 +8,7 @@
 
 #include "ftcs/daemon/ethercat/cycle_csv.h"
 #include "ftcs/daemon/ethercat/plant_clock.h"
+#include "ftcs/daemon/service_report.h"
 #include "ftcs/experiment/cycle_figures.h"
 #include "ftcs/node/cycle_node.h"
 #include "ftcs/platform/ethercat_link.h"
@@ -96,6 +97,7 @@ class MainRunner {
   void stop_drives();
   void print_live() const;
   [[nodiscard]] std::optional<ReferenceTime> plant_now(FreeRunningTime now);
+  [[nodiscard]] std::string service_sentence() const;
 
   RunOptions options_;
   platform::EthercatLink link_;
@@ -105,6 +107,7 @@ class MainRunner {
   FreeRunningTime next_line_;
   CycleCsv csv_;
   std::optional<PlantClock> plant_;
+  ServiceReport service_;
 };
 
 }  // namespace ftcs::daemon

@@ -178,7 +178,10 @@ int PhcRunner::run() {
                                      discipline().latest().servo);
     if (wrong) fail(*wrong);
     follow_scale_change();
+    service_.turn(FreeRunningTime::from_ns(kernel_.clock_ns(CLOCK_MONOTONIC_RAW)),
+                  may && discipline().locked(), [&] { return service_sentence(may); });
   }
+  service_.stopping();
   sink_->stop();
   if (!failure_) failure_ = sink_->refusal();
   if (failure_) {
@@ -186,6 +189,14 @@ int PhcRunner::run() {
     return kRuntimeError;
   }
   return finish();
+}
+
+std::string PhcRunner::service_sentence(bool follows) const {
+  if (!follows) return fmt::format("not locked: {} waits for its PTP port", sink_->name());
+  const Telemetry& seen = discipline().latest();
+  return fmt::format("{}: {} is {:.0f} ns from {}, rate {:+.0f} ppb",
+                     discipline().locked() ? "locked" : "not locked", sink_->name(),
+                     seen.servo.offset.ns(), source_.name(), seen.tracking_rate.ppb());
 }
 
 // Until the next reading is due or a correction has to end.

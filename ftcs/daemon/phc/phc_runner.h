@@ -11,6 +11,7 @@
 #include "ftcs/daemon/phc/port_watch.h"
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/run_summary.h"
+#include "ftcs/daemon/service_report.h"
 #include "ftcs/node/clock_follower.h"
 #include "ftcs/platform/clock_device.h"
 
@@ -49,6 +50,7 @@ class PhcRunner {
   PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
 
   void wait();
+  [[nodiscard]] std::string service_sentence(bool follows) const;
   void follow_scale_change();
   [[nodiscard]] bool may_follow();
   [[nodiscard]] bool port_is_usable() const;
@@ -79,6 +81,7 @@ class PhcRunner {
   std::int64_t next_raw_ns_ = 0;
   bool reading_failed_ = false;
   std::optional<std::string> failure_;
+  ServiceReport service_{};
 };
 
 /// Everything that `ftcs phc` does once its options are known to be consistent.
