@@ -26,8 +26,11 @@ add_module() {  # ROOT NAME
   echo "$name" >> "$root/modules/order"
 }
 
+# The same files make the same archive: the kernel reads its headers, and a digit more is an instruction more.
 archive() {  # ROOT ARCHIVE
-  (cd "$1" && find . -print | LC_ALL=C sort | "$prefix/bin/busybox" cpio -o -H newc -R 0:0 2> /dev/null) > "$2.new"
+  find "$1" -exec touch -h -d @0 {} +
+  (cd "$1" && find . -print | LC_ALL=C sort |
+    "$prefix/bin/busybox" cpio -o -H newc -R 0:0 --renumber-inodes --ignore-devno 2> /dev/null) > "$2.new"
   mv "$2.new" "$2"
 }
 
