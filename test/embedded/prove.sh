@@ -10,6 +10,6 @@ for property in difference shifted part_of times quotient; do
     { grep -E 'FAILURE' build-embedded/prove.log; echo "FAILED: prove_$property"; exit 1; }
   echo "  $property: no overflow, no shift out of range, no division by zero, for every operand"
 done
-"$cbmc" test/embedded/prove.c --function prove_limits --no-standard-checks --unwind 150 > build-embedded/prove.log ||
+"$cbmc" test/embedded/prove.c --function prove_limits --no-standard-checks --unwind 200 --unwinding-assertions > build-embedded/prove.log ||
   { grep -E 'FAILURE' build-embedded/prove.log; echo "FAILED: prove_limits"; exit 1; }
 echo "  limits: no addend outside nominal (1 +- F), whatever the servo holds and is fed"
