@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/daemon/follower_record.h"
 
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -217,14 +216,17 @@ std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
     case Output::kText:
       break;
     case Output::kJson:
-      fmt::print("{}\n", json_line(record));
+      samples_.write(json_line(record) + "\n");
       break;
     case Output::kCsv:
-      fmt::print("{}\n", csv_line(record));
+      samples_.write(csv_line(record) + "\n");
       break;
   }
-  if (options_.output != Output::kText && std::fflush(stdout) != 0) {
-    return fmt::format("standard output: {}", std::strerror(errno));
+  if (samples_.error() != 0) {
+    return fmt::format("standard output: {}", std::strerror(samples_.error()));
+  }
+  if (const std::uint64_t lost = samples_.take_lost(); lost > 0) {
+    log_(LogLevel::kWarning, "standard output: {} samples lost, nobody reads them", lost);
   }
   if (!record.offset_known) return std::nullopt;
   summary_.add(record);

@@ -69,6 +69,7 @@ class FollowerRecord {
 
   const PtpOptions& options_;
   Log& log_;
+  platform::LineWriter samples_{stdout};  ///< as JSON or CSV
   StateKeeper& state_;
   const ClockDiscipline& discipline_;
   FreeRunningTime start_;

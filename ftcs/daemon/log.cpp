@@ -3,16 +3,50 @@
 
 #include <ctime>
 #include <string>
+#include <utility>
 
 namespace ftcs::daemon {
+
+Log::Log(platform::Kernel& kernel, std::FILE* stream, int level)
+    : kernel_(kernel), lines_(stream), errors_(stderr), level_(level) {
+  std::fflush(stream);  // from here on lines go by it
+}
+
+bool Log::admits(LogLevel level, const char* kind) {
+  const bool from_outside = level == LogLevel::kWarning || level == LogLevel::kNotice;
+  if (!from_outside) return true;  // errors end a run, samples have a rate of their own
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  const std::int64_t second = kernel_.clock_ns(CLOCK_MONOTONIC) / kNsPerSecond;
+  Kind& known = kinds_[kind];
+  if (known.second != second) {
+    const std::uint64_t left_out = std::exchange(known.left_out, 0);
+    known.second = second;
+    known.told = 0;
+    if (left_out > 0) write(level, fmt::format("{} lines of the next kind left out", left_out));
+  }
+  if (++known.told <= kMostASecond) return true;
+  ++known.left_out;
+  return false;
+}
 
 void Log::write(LogLevel level, std::string_view text) {
   constexpr std::int64_t kNsPerMs = 1'000'000;
   const std::int64_t ms = kernel_.clock_ns(CLOCK_MONOTONIC) / kNsPerMs;
-  std::FILE* const stream = level <= LogLevel::kError ? stderr : stream_;
-  const std::string line = fmt::format("ftcs[{}.{:03}]: {}\n", ms / 1000, ms % 1000, text);
-  std::fputs(line.c_str(), stream);  // a log on a full disk is no reason to stop steering
-  std::fflush(stream);               // whoever follows a pipe wants each line at once
+  const auto line = [ms](std::string_view what) {
+    return fmt::format("ftcs[{}.{:03}]: {}\n", ms / 1000, ms % 1000, what);
+  };
+  if (level <= LogLevel::kError) return errors_.write(line(text));
+  lines_.flush();
+  lost_ += lines_.take_lost();
+  if (lines_.is_empty() && lost_ > 0) {
+    lines_.write(line(fmt::format("{} lines lost: nobody read them", std::exchange(lost_, 0))));
+  }
+  lines_.write(line(text));
+}
+
+void Log::flush() {
+  lines_.flush();
+  errors_.flush();
 }
 
 }  // namespace ftcs::daemon

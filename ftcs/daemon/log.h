@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "ftcs/platform/kernel.h"
+#include "ftcs/platform/line_writer.h"
 
 namespace ftcs::daemon {
 
@@ -16,25 +18,41 @@ namespace ftcs::daemon {
 enum class LogLevel : std::uint8_t { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kDebug = 7 };
 
 /// Lines as parsers of ptp4l's log know them: "ftcs[seconds.milliseconds]: text", seconds of
-/// CLOCK_MONOTONIC. Errors go to standard error.
+/// CLOCK_MONOTONIC. Errors go to standard error. Nobody waits for a reader (platform::LineWriter);
+/// what a flood of messages brings about, notices and warnings, is told kMostASecond times a second
+/// of each kind. How many lines were lost or left out is a line of its own.
 class Log {
  public:
-  Log(platform::Kernel& kernel, std::FILE* stream, int level)
-      : kernel_(kernel), stream_(stream), level_(level) {}
+  static constexpr int kMostASecond = 10;
+
+  Log(platform::Kernel& kernel, std::FILE* stream, int level);
 
   template <class... Arguments>
   void operator()(LogLevel level, fmt::format_string<Arguments...> format,
                   Arguments&&... arguments) {
     if (static_cast<int>(level) > level_) return;
+    if (!admits(level, fmt::string_view(format).data())) return;
     write(level, fmt::format(format, std::forward<Arguments>(arguments)...));
   }
+  /// Once per turn of a loop: writes what a reader was not ready for.
+  void flush();
 
  private:
+  struct Kind {
+    std::int64_t second = -1;
+    int told = 0;
+    std::uint64_t left_out = 0;
+  };
+  /// `kind`: the place of its format string.
+  [[nodiscard]] bool admits(LogLevel level, const char* kind);
   void write(LogLevel level, std::string_view text);
 
   platform::Kernel& kernel_;
-  std::FILE* stream_;
+  platform::LineWriter lines_;
+  platform::LineWriter errors_;
   int level_;
+  std::map<const char*, Kind> kinds_{};
+  std::uint64_t lost_ = 0;
 };
 
 }  // namespace ftcs::daemon

@@ -48,6 +48,7 @@ std::optional<platform::OsError> MonitorReceiver::open_source() {
 
 void MonitorReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
+  std::fflush(stdout);
   last_report_ = now;
   log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",
         has_hardware_stamps() ? "hardware" : "software", options().monitor_socket);

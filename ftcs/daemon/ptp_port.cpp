@@ -78,6 +78,7 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   report_stamps();
   if (management_) management_->serve(*managed(), now());
   housekeeping(now());
+  log_.flush();
 }
 
 bool PtpPort::open_feed() {

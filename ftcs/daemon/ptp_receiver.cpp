@@ -52,6 +52,7 @@ PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Lo
 
 void PtpReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
+  std::fflush(stdout);
   node_.start(now);
   take_events(now);
 }

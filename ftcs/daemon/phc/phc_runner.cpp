@@ -164,6 +164,7 @@ int PhcRunner::run() {
   };
   while (!stop.is_set() && !failure_ && !port_moved_ && !is_over()) {
     wait();
+    log_.flush();
     const bool may = may_follow();
     follow_scale_change();
     if (kernel_.clock_ns(CLOCK_MONOTONIC_RAW) >= next_raw_ns_) {

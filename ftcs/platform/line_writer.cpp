@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/line_writer.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <poll.h>
+#include <unistd.h>
+#include <utility>
+
+#include <climits>
+
+namespace ftcs::platform {
+namespace {
+
+bool is_ready(int descriptor) {
+  pollfd entry{descriptor, POLLOUT, 0};
+  return ::poll(&entry, 1, 0) > 0;  // an error too: the write will tell
+}
+
+}  // namespace
+
+void LineWriter::write(std::string_view line) {
+  if (kept_.size() + line.size() > kMostKept) flush();
+  if (kept_.size() + line.size() > kMostKept) {
+    ++lost_;
+    return;
+  }
+  kept_ += line;
+  flush();
+}
+
+// A pipe that is ready takes PIPE_BUF octets without waiting.
+void LineWriter::flush() {
+  if (kept_.empty()) return;
+  const int descriptor = ::fileno(stream_);
+  std::size_t done = 0;
+  while (done < kept_.size() && is_ready(descriptor)) {
+    const std::size_t size = std::min<std::size_t>(kept_.size() - done, PIPE_BUF);
+    const ssize_t written = ::write(descriptor, kept_.data() + done, size);
+    if (written >= 0) {
+      done += static_cast<std::size_t>(written);
+    } else if (errno == EAGAIN) {
+      break;
+    } else if (errno != EINTR) {
+      error_ = errno;
+      done = kept_.size();
+    }
+  }
+  kept_.erase(0, done);
+}
+
+std::uint64_t LineWriter::take_lost() { return std::exchange(lost_, 0); }
+
+}  // namespace ftcs::platform
