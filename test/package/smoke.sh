@@ -20,6 +20,8 @@ mmdebstrap --quiet --variant=apt --include=g++,cmake,make,pkg-config,passwd "${S
 mount -t proc proc "$root/proc"
 printf '#!/bin/sh\nexit 101\n' > "$root/usr/sbin/policy-rc.d"  # no service is started in a chroot
 chmod 755 "$root/usr/sbin/policy-rc.d"
+cp -L /etc/resolv.conf "$root/etc/resolv.conf"
+inside apt-get update -qq
 mkdir "$root/packages"
 cp "$folder"/*.deb "$root/packages"
 # What the package needs stays out of the comparison.
