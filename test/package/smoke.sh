@@ -46,7 +46,7 @@ inside sh -c 'cd /tmp && cp -r /usr/share/doc/libftcs-dev/examples e && gunzip -
 inside apt-get remove -y -qq ftcs libftcs-dev > "$root/log" 2>&1 || { cat "$root/log"; fail "apt remove"; }
 [ ! -e "$root/usr/bin/ftcs" ] || fail "the program is still there"
 [ -e "$root/etc/ftcs/ptp.conf" ] || fail "remove took the configuration, which is for purge"
-inside apt-get purge -y -qq ftcs libftcs-dev > "$root/log" 2>&1 || { cat "$root/log"; fail "apt purge"; }
+inside dpkg --purge ftcs > "$root/log" 2>&1 || { cat "$root/log"; fail "dpkg --purge"; }
 inside getent passwd ftcs > /dev/null && fail "the user ftcs is still there"
 files > "$root/after"
 left=$(comm -13 "$root/before" "$root/after" | grep -Ev '^var/(cache|log|lib/(dpkg|apt))|^etc/(passwd|group|shadow|gshadow|subuid|subgid)-?$' || true)
