@@ -31,6 +31,9 @@ std::int64_t number(std::string_view text) {
 ServiceManager::ServiceManager(std::string socket, std::int64_t watchdog_us)
     : socket_(std::move(socket)), watchdog_ns_(std::max<std::int64_t>(watchdog_us, 0) * 1000) {
   if (!socket_.empty()) fd_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  // A loop at real-time priority speaks through it: room once, never again.
+  sentence_.reserve(kSentence);
+  datagram_.reserve(kSentence + sizeof "STATUS=");
 }
 
 ServiceManager ServiceManager::from_environment() {
@@ -46,7 +49,8 @@ ServiceManager::ServiceManager(ServiceManager&& other) noexcept
       fd_(std::exchange(other.fd_, -1)),
       ready_(other.ready_),
       alive_ns_(other.alive_ns_),
-      sentence_(std::move(other.sentence_)) {}
+      sentence_(std::move(other.sentence_)),
+      datagram_(std::move(other.datagram_)) {}
 
 ServiceManager::~ServiceManager() {
   if (fd_ >= 0) close(fd_);
@@ -60,7 +64,9 @@ void ServiceManager::status(std::string_view sentence) {
   if (sentence == sentence_) return;
   sentence_ = sentence;
   std::replace(sentence_.begin(), sentence_.end(), '\n', ' ');  // one line is one assignment
-  send("STATUS=" + sentence_);
+  datagram_ = "STATUS=";
+  datagram_ += sentence_;
+  send(datagram_);
 }
 
 void ServiceManager::stopping() { send("STOPPING=1"); }

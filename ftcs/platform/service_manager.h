@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,6 +15,8 @@ namespace ftcs::platform {
 /// alive, and a sentence for `systemctl status`. Without a service manager every call does nothing.
 class ServiceManager {
  public:
+  static constexpr std::size_t kSentence = 400;
+
   /// `socket`: $NOTIFY_SOCKET, a path or @ and an abstract name; empty: nobody listens.
   /// `watchdog_us`: $WATCHDOG_USEC; zero: nobody waits for signs of life.
   explicit ServiceManager(std::string socket, std::int64_t watchdog_us = 0);
@@ -29,7 +32,7 @@ class ServiceManager {
   /// Once; later calls do nothing, unless it did not go through (a full queue): then it is told
   /// again. What waits for the service starts now.
   void ready();
-  /// A sentence; the same one again is not sent.
+  /// A sentence; the same one again is not sent. Up to kSentence octets it touches no heap.
   void status(std::string_view sentence);
   /// The service ends on purpose.
   void stopping();
@@ -50,6 +53,7 @@ class ServiceManager {
   bool ready_ = false;
   std::optional<std::int64_t> alive_ns_{};
   std::string sentence_{};
+  std::string datagram_{};
   std::optional<OsError> error_{};
 };
 

@@ -157,13 +157,15 @@ std::optional<ReferenceTime> MainRunner::plant_now(FreeRunningTime now) {
   return wanted ? plant_->at(now) : std::nullopt;
 }
 
-std::string MainRunner::service_sentence() const {
+std::string_view MainRunner::service_sentence() {
   const ethercat::CycleReport& report = main().last_cycle();
   const bool locked = decision().state == CycleState::kLocked;
-  return fmt::format("{}{}: phase {:+.3f} us, margin {:.1f} us, working counter {} of {}",
-                     locked ? "" : "not locked, ", name(decision().state),
-                     decision().phase_error.ns() * 1e-3, figures().margin.quantile(0.5) * 1e-3,
-                     report.working_counter, report.expected);
+  const auto written = fmt::format_to_n(
+      sentence_.data(), sentence_.size(),
+      "{}{}: phase {:+.3f} us, margin {:.1f} us, working counter {} of {}",
+      locked ? "" : "not locked, ", name(decision().state), decision().phase_error.ns() * 1e-3,
+      figures().margin.quantile(0.5) * 1e-3, report.working_counter, report.expected);
+  return {sentence_.data(), std::min(written.size, sentence_.size())};
 }
 
 void MainRunner::print_live() const {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "ftcs/daemon/ethercat/cycle_csv.h"
 #include "ftcs/daemon/ethercat/plant_clock.h"
@@ -97,7 +99,7 @@ class MainRunner {
   void stop_drives();
   void print_live() const;
   [[nodiscard]] std::optional<ReferenceTime> plant_now(FreeRunningTime now);
-  [[nodiscard]] std::string service_sentence() const;
+  [[nodiscard]] std::string_view service_sentence();
 
   RunOptions options_;
   platform::EthercatLink link_;
@@ -108,6 +110,7 @@ class MainRunner {
   CycleCsv csv_;
   std::optional<PlantClock> plant_;
   ServiceReport service_;
+  std::array<char, 160> sentence_{};  ///< the cyclic path touches no heap
 };
 
 }  // namespace ftcs::daemon
