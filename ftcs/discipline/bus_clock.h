@@ -121,7 +121,6 @@ class BusClock {
   double rate_ = 0.0;         ///< deviation that is commanded
   double offset_ns_ = 0.0;    ///< integral of it
   FreeRunningTime crystal_;   ///< L of the last usable sample
-  bool started_ = false;
 };
 
 }  // namespace ftcs

@@ -25,8 +25,8 @@ class Lateness {
   /// Whether a clock that changed can have brought it, both directions being
   /// there.
   [[nodiscard]] bool speaks_of_clock() const noexcept {
-    const int ahead = sides_[0].sign;
-    const int back = sides_[1].sign;
+    const int ahead = static_cast<int>(sides_[0].sign);
+    const int back = static_cast<int>(sides_[1].sign);
     return ahead * back <= 0;
   }
   void clear() noexcept { sides_ = {}; }

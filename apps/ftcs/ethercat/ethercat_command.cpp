@@ -76,18 +76,21 @@ node::BusWrite write_of(const std::string& name) {
   return name == "read-time" ? node::BusWrite::kReadTime : node::BusWrite::kOffset;
 }
 
-Wrong complete(EthercatArguments& arguments) {
+Wrong read_udp(EthercatArguments& arguments) {
+  if (arguments.udp.empty()) return {};
+  daemon::RunOptions& options = arguments.options;
+  const std::size_t colon = arguments.udp.rfind(':');
+  options.host = arguments.udp.substr(0, colon);
+  if (colon == std::string::npos) return {};
+  const auto port = parse_integer(arguments.udp.substr(colon + 1), 1, 65535);
+  if (!port) return "--udp: " + port.error().message;
+  options.port = static_cast<std::uint16_t>(*port);
+  return {};
+}
+
+Wrong read_times(EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
   CycleServoConfig& servo = options.servo;
-  if (!arguments.udp.empty()) {
-    const std::size_t colon = arguments.udp.rfind(':');
-    options.host = arguments.udp.substr(0, colon);
-    if (colon != std::string::npos) {
-      const auto port = parse_integer(arguments.udp.substr(colon + 1), 1, 65535);
-      if (!port) return "--udp: " + port.error().message;
-      options.port = static_cast<std::uint16_t>(*port);
-    }
-  }
   Nanoseconds interval{0};
   Nanoseconds band{0};
   Nanoseconds lock{0};
@@ -109,6 +112,13 @@ Wrong complete(EthercatArguments& arguments) {
   servo.cycles_per_sync =
       static_cast<std::uint32_t>(std::max<std::int64_t>(1, interval / servo.cycle));
   servo.align_at_start = !arguments.slew;
+  return {};
+}
+
+Wrong complete(EthercatArguments& arguments) {
+  daemon::RunOptions& options = arguments.options;
+  if (auto wrong = read_udp(arguments)) return wrong;
+  if (auto wrong = read_times(arguments)) return wrong;
   options.lock_policy = policy_of(arguments.lock_policy);
   options.bus_mode = mode_of(arguments.bus_mode);
   options.bus_write = write_of(arguments.bus_write);

@@ -123,7 +123,7 @@ TEST_F(BadInput, a_mailbox_full_of_something_else_does_not_prolong_the_deadline_
   config.clocks.drift_pulses = 10;
   config.process.objects = kObject;
   bench_.configure(config);
-  bench_.tamper = [this](const FrameView& frame) {
+  bench_.tamper = [](const FrameView& frame) {
     const Datagram datagram = frame[0];
     if (datagram.command() != Command::kFprd || datagram.data().size() < 64) return;
     store(datagram.data(), 0, std::uint16_t{10});
