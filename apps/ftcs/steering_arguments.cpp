@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include "apps/ftcs/units.h"
