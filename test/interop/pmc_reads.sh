@@ -52,7 +52,8 @@ receive --uds_address "$folder/ftcs.uds" --duration 1 > "$folder/second.log" 2>&
 wait $! || code=$?
 [ "$code" -eq 1 ] || fail "a second instance on the same socket: exit code $code, expected 1"
 grep -q "ftcs.uds: already in use" "$folder/second.log" || fail "no clear error of the second instance"
-status > "$folder/status.log" || fail "the first instance does not answer any more"
+# It answers: 0 locked, 3 not locked at this moment, as on a host that is busy with the second instance.
+status > "$folder/status.log" || [ $? -eq 3 ] || fail "the first instance does not answer any more"
 
 kill -INT "$receiver"
 wait "$receiver" || fail "the receiver's exit code is $?"
