@@ -73,6 +73,18 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
   }
   watch_for_silence(now);
   log_lock();
+  service().turn(now, follower_.locked(), [this] { return service_sentence(); });
+}
+
+std::string MonitorReceiver::service_sentence() const {
+  if (!source_.transmitter()) {
+    return fmt::format("not locked: no timestamps of a ptp4l on {}", options().monitor_socket);
+  }
+  const Telemetry& seen = follower_.discipline().latest();
+  if (!seen.servo.offset_known) return "not locked: ptp4l reports, the path delay is not known yet";
+  return fmt::format("{}: offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
+                     follower_.locked() ? "locked" : "not locked", seen.servo.offset.ns(),
+                     seen.servo.path_delay.ns(), seen.tracking_rate.ppb());
 }
 
 // Before the next sample, which would be seconds off. The clock is never stepped for it.

@@ -48,6 +48,7 @@ class MonitorReceiver final : public PtpPort, private Managed {
   void on_sample(const ptp::MonitorSample& sample);
   void watch_for_silence(FreeRunningTime now);
   void log_lock();
+  [[nodiscard]] std::string service_sentence() const;
   [[nodiscard]] ptp::PortState state() const;
 
   PortFacts facts_;

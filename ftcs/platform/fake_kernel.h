@@ -64,6 +64,7 @@ class FakeKernel : public Kernel {
   int hardware_config_errno = 0;
   int open_errno = 0;
   bool gives_tx_stamps = true;
+  bool stamps_are_on = false;  ///< what SIOCGHWTSTAMP says of the adapter
 
   std::map<int, Socket> sockets;
   std::vector<Packet> sent;
@@ -166,6 +167,13 @@ class FakeKernel : public Kernel {
       }
       case SIOCSHWTSTAMP:
         return -hardware_config_errno;
+      case SIOCGHWTSTAMP: {
+        auto* config = reinterpret_cast<hwtstamp_config*>(query->ifr_data);
+        config->tx_type = stamps_are_on ? HWTSTAMP_TX_ON : HWTSTAMP_TX_OFF;
+        config->rx_filter =
+            stamps_are_on ? HWTSTAMP_FILTER_PTP_V2_L4_EVENT : HWTSTAMP_FILTER_NONE;
+        return 0;
+      }
       default:
         return -EOPNOTSUPP;
     }

@@ -99,6 +99,20 @@ std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd, const std::s
   return std::nullopt;
 }
 
+namespace {
+
+/// Asking needs no right: somebody who had it may have switched the stamps on already.
+bool stamps_already(Kernel& kernel, int fd, const std::string& name, unsigned wanted_filters) {
+  hwtstamp_config config{};
+  ifreq request = request_for(name);
+  request.ifr_data = reinterpret_cast<char*>(&config);
+  if (kernel.control(fd, SIOCGHWTSTAMP, &request) < 0) return false;
+  return config.tx_type == HWTSTAMP_TX_ON && config.rx_filter >= 0 && config.rx_filter < 32 &&
+         ((1U << static_cast<unsigned>(config.rx_filter)) & wanted_filters) != 0;
+}
+
+}  // namespace
+
 std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const std::string& name,
                                                   const InterfaceCapabilities& capabilities,
                                                   bool ethernet) {
@@ -107,6 +121,8 @@ std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const 
       ethernet ? HWTSTAMP_FILTER_PTP_V2_L2_EVENT : HWTSTAMP_FILTER_PTP_V2_L4_EVENT,
       HWTSTAMP_FILTER_PTP_V2_EVENT, HWTSTAMP_FILTER_ALL};
   int result = -ERANGE;
+  unsigned wanted = 0;
+  for (const auto filter : filters) wanted |= 1U << filter;
   for (const auto filter : filters) {
     if ((capabilities.receive_filters & (1U << filter)) == 0) continue;
     hwtstamp_config config{};
@@ -118,6 +134,7 @@ std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const 
     if (result >= 0) return std::nullopt;
     if (result == -EPERM) break;
   }
+  if (result == -EPERM && stamps_already(kernel, fd, name, wanted)) return std::nullopt;
   return os_error(-result, "hardware time stamping on " + name);
 }
 

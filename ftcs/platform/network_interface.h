@@ -43,7 +43,7 @@ struct InterfaceCapabilities {
                                                           const std::string& name);
 
 /// Asks the driver to stamp PTP messages in both directions: over UDP, or over IEEE 802.3 itself.
-/// Needs CAP_NET_ADMIN.
+/// Needs CAP_NET_ADMIN, unless they are on already.
 [[nodiscard]] std::optional<OsError> enable_hardware_timestamps(
     Kernel& kernel, int fd, const std::string& name, const InterfaceCapabilities& capabilities,
     bool ethernet);

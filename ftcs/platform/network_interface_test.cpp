@@ -45,6 +45,11 @@ TEST(NetworkInterface, reports_why_hardware_stamps_cannot_be_enabled) {
   const auto denied = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false);
   ASSERT_TRUE(denied);
   EXPECT_EQ(denied->kind, OsErrorKind::kNotPermitted);
+  kernel.stamps_are_on = true;
+  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false))
+      << "somebody who may has switched them on";
+  EXPECT_TRUE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, true))
+      << "those of UDP are not those of IEEE 802.3";
   capabilities.receive_filters = 0;
   const auto none = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false);
   ASSERT_TRUE(none);

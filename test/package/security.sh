@@ -6,7 +6,7 @@ command -v systemd-analyze > /dev/null || { echo "no systemd-analyze here"; exit
 units=$(realpath "$1")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-for limit in ptp:21 phc:20 ethercat:16; do
+for limit in ptp:20 phc:20 ethercat:16; do
   name=ftcs-${limit%:*}@eth0.service
   cp "$units/ftcs-${limit%:*}@.service" "$work/$name"
   # Exit code 1 above the threshold.

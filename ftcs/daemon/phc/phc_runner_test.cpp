@@ -3,7 +3,10 @@
 // hardware clock takes 0.8 us over the bus. `phc - system` is the truth.
 #include "ftcs/daemon/phc/phc_runner.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,6 +14,7 @@
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/platform/fake_clocks.h"
 #include "ftcs/platform/fake_preemption.h"
+#include "ftcs/platform/local_socket.h"
 
 namespace ftcs::daemon {
 namespace {
@@ -300,6 +304,25 @@ TEST(PhcRunner, says_which_clocks_how_and_by_what_servo) {
   EXPECT_NE(testing::internal::GetCapturedStdout().find(
                 "CLOCK_REALTIME follows /dev/ptp0 (compared by extended; servo linuxptp-pi)"),
             std::string::npos);
+}
+
+TEST(PhcRunner, tells_the_service_manager_why_it_waits_and_when_it_is_locked) {
+  auto manager = platform::LocalSocket::client();  // of this process, in systemd's place
+  ASSERT_TRUE(manager.ok());
+  ASSERT_EQ(setenv("NOTIFY_SOCKET", manager->path().c_str(), 1), 0);
+  World world;
+  EXPECT_EQ(world.run(20.0), kSuccess);
+  unsetenv("NOTIFY_SOCKET");
+  std::vector<std::string> heard;
+  while (const auto datagram = manager->receive()) {
+    heard.emplace_back(datagram->bytes.begin(), datagram->bytes.end());
+  }
+  const auto ready = std::find(heard.begin(), heard.end(), "READY=1");
+  ASSERT_NE(ready, heard.end());
+  EXPECT_TRUE(heard.front().starts_with("STATUS=not locked")) << heard.front();
+  EXPECT_TRUE((ready - 1)->starts_with("STATUS=locked: CLOCK_REALTIME is ")) << *(ready - 1);
+  EXPECT_EQ(std::count(heard.begin(), heard.end(), "READY=1"), 1);
+  EXPECT_EQ(heard.back(), "STOPPING=1");
 }
 
 TEST(PhcRunner, says_what_cannot_be_opened_and_touches_nothing) {
