@@ -170,8 +170,7 @@ class FakeKernel : public Kernel {
       case SIOCGHWTSTAMP: {
         auto* config = reinterpret_cast<hwtstamp_config*>(query->ifr_data);
         config->tx_type = stamps_are_on ? HWTSTAMP_TX_ON : HWTSTAMP_TX_OFF;
-        config->rx_filter =
-            stamps_are_on ? HWTSTAMP_FILTER_PTP_V2_L4_EVENT : HWTSTAMP_FILTER_NONE;
+        config->rx_filter = stamps_are_on ? HWTSTAMP_FILTER_PTP_V2_L4_EVENT : HWTSTAMP_FILTER_NONE;
         return 0;
       }
       default:

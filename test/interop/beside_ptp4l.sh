@@ -49,8 +49,16 @@ if [ "$duration" -ge 20 ]; then
   grep -q "slave_event_monitor $folder/monitor.*free_running 1" "$folder/alone.log" || fail "no hint what to set"
 fi
 
+python3 -c '
+import socket, sys
+manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+manager.bind(sys.argv[1])
+while True:
+    print(manager.recv(4096).decode(), flush=True)' "$folder/manager" > "$folder/notified" &
+pids+=($!)
+for _ in $(seq 50); do [ -S "$folder/manager" ] && break; sleep 0.1; done
 receiver
-follow > "$folder/follow.log" 2>&1 &
+NOTIFY_SOCKET="$folder/manager" follow > "$folder/follow.log" 2>&1 &
 follower=$!
 pids+=("$follower")
 wait_for_lock "at the start"
@@ -58,6 +66,8 @@ pmc -u -b 0 -s "$folder/ftcs.uds" -i "$folder/pmc.uds" "GET PARENT_DATA_SET" > "
 their_identity=$(sed -n 's/^ptp4l.*selected local clock \(.*\) as best master/\1/p' "$folder/transmitter.log")
 grep -q "grandmasterIdentity *$their_identity" "$folder/pmc.txt" || fail "pmc does not see the grandmaster $their_identity"
 
+grep -q "^STATUS=not locked" "$folder/notified" || fail "the service manager is not told that it is not locked"
+grep -B1 "^READY=1" "$folder/notified" | grep -q "^STATUS=locked" || fail "the service manager is not told of the lock"
 # What is no report is counted and does no harm.
 python3 - "$folder/monitor" << 'END'
 import socket, sys
