@@ -63,6 +63,9 @@ void BusClock::on_new_plant_time() noexcept {
 
 const BusClockDecision& BusClock::update(const BusClockSample& sample) noexcept {
   carry_on();
+  const bool seen = sample.usable || sample.has_dc;
+  if (seen) crystal_ = crystal_of(sample);
+  unseen_ = seen ? 0 : unseen_ + 1;
   if (sample.usable) collect(sample);
   if (++cycles_ >= cycles_per_sample_) {
     estimate();
@@ -79,13 +82,17 @@ void BusClock::collect(const BusClockSample& sample) noexcept {
     first_ = sample;
     sum_crystal_ns_ = 0.0;
   }
-  crystal_ = crystal_of(sample);
   const std::uint32_t stride = cycles_per_sample_ / kMostKept + 1;
   if (used_ > 0 && (cycles_ % stride != 0 || used_ == kMostKept)) return;
   const double crystal_ns = (crystal_ - crystal_of(first_)).ns();
   const double plant_ns = (sample.plant - first_.plant).ns();
   sum_crystal_ns_ += crystal_ns;
   residuals_[used_++] = static_cast<float>(plant_ns - crystal_ns * (1.0 + tracking_));
+}
+
+/// L in this cycle, whose frame may have been lost: it has gone on by as many cycles of R.
+FreeRunningTime BusClock::crystal_now() const noexcept {
+  return crystal_ + Duration::from_ns(static_cast<double>(unseen_) * cycle_ns() / (1.0 + rate_));
 }
 
 /// The middle of the interval, on a line of the known rate through the median.
@@ -101,7 +108,8 @@ void BusClock::estimate() noexcept {
   const Duration offset = Duration::from_ns(offset_ns_);
   const LocalTime shown = relabel<LocalTime>(crystal + offset);
   // The frame has just written the offset that was decided a cycle ago; SYNC0 is still to come.
-  const ClockReading now{crystal_, relabel<LocalTime>(crystal_ + offset)};
+  // The last sample may lie as far back as the interval is long, and the drift since with it.
+  const ClockReading now{crystal_now(), relabel<LocalTime>(crystal_now() + offset)};
   static_cast<void>(estimator_.update({Direction::kForward, plant, shown, crystal}, now));
   const ServoSnapshot snapshot = estimator_.snapshot_at(now);
   if (!snapshot.offset_known) return;

@@ -32,6 +32,7 @@ struct BusClockConfig {
 /// One cycle: what the reference clock of the bus and plant time showed at one instant.
 struct BusClockSample {
   bool usable = false;     ///< both are known and nothing speaks against them
+  bool has_dc = false;     ///< dc is known, whether plant time is or not
   LocalTime dc;            ///< system time of the reference clock, latched by the frame
   ReferenceTime plant;     ///< plant time at the same instant
   std::int64_t offset_ns;  ///< what had been added to the system time offset when it was latched
@@ -95,6 +96,7 @@ class BusClock {
  private:
   void carry_on() noexcept;
   void collect(const BusClockSample& sample) noexcept;
+  [[nodiscard]] FreeRunningTime crystal_now() const noexcept;
   void estimate() noexcept;
   void judge() noexcept;
   void move() noexcept;
@@ -120,7 +122,8 @@ class BusClock {
   double tracking_ = 0.0;     ///< deviation of the rate that tracks
   double rate_ = 0.0;         ///< deviation that is commanded
   double offset_ns_ = 0.0;    ///< integral of it
-  FreeRunningTime crystal_;   ///< L of the last usable sample
+  FreeRunningTime crystal_;   ///< L, when it was last seen
+  std::uint32_t unseen_ = 0;  ///< cycles since then
 };
 
 }  // namespace ftcs

@@ -5,6 +5,7 @@
 #include "ftcs/discipline/bus_clock.h"
 
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -21,7 +22,8 @@ class Bus : public ::testing::Test {
       const double noise = noise_(random_) * 100.0;
       const auto ticks = static_cast<std::int64_t>(crystal_ns_ / 10.0) * 10;
       BusClockSample sample;
-      sample.usable = plant;
+      sample.has_dc = !lost_(i);
+      sample.usable = plant && sample.has_dc && (i % plant_each_ == plant_each_ / 3);
       sample.offset_ns = register_;
       sample.dc = LocalTime::from_ns(ticks + register_);
       sample.plant = ReferenceTime{Duration::from_ns(true_ns_ + step_ns_ + noise)};
@@ -41,6 +43,8 @@ class Bus : public ::testing::Test {
   }
 
   BusClock clock_{BusClockConfig{}};
+  int plant_each_ = 1;  ///< plant time is known in one cycle of so many
+  std::function<bool(int)> lost_ = [](int) { return false; };
   double ppm_ = 100.0;
   double true_ns_ = 0.0;
   double crystal_ns_ = 200'000.0;  ///< that much ahead at the start
@@ -108,6 +112,22 @@ TEST_F(Bus, without_plant_time_the_last_rate_is_kept_and_the_deviation_grows) {
   run(20'000);
   EXPECT_EQ(clock_.decision().state, BusClockState::kLocked);
   EXPECT_LE(largest_increment_, 401);
+}
+
+TEST_F(Bus, tells_the_offset_of_now_however_rarely_plant_time_is_read) {
+  plant_each_ = 125;
+  run(30'000);
+  EXPECT_EQ(clock_.decision().state, BusClockState::kLocked);
+  EXPECT_NEAR(clock_.decision().dc_to_plant.ns(), error_ns(), 200.0);
+  EXPECT_LT(std::abs(error_ns()), 250.0);
+}
+
+TEST_F(Bus, frames_lost_at_the_end_of_an_interval_cost_no_drift) {
+  ppm_ = 200.0;
+  lost_ = [](int i) { return i % 125 >= 85; };
+  run(20'000);
+  EXPECT_EQ(clock_.decision().state, BusClockState::kLocked);
+  EXPECT_NEAR(clock_.decision().dc_to_plant.ns(), error_ns(), 60.0);
 }
 
 TEST_F(Bus, that_is_only_watched_is_never_moved) {

@@ -73,7 +73,9 @@ int32_t ftcs_bus_init(ftcs_bus_clock* clock, size_t storage_size, const ftcs_bus
 
 ftcs_bus_decision ftcs_bus_update(ftcs_bus_clock* clock, const ftcs_bus_sample* sample) {
   ftcs::BusClockSample given;
-  given.usable = sample->usable != 0;
+  constexpr int32_t kAllButPlant = 2;
+  given.has_dc = sample->usable != 0;
+  given.usable = given.has_dc && sample->usable != kAllButPlant;
   given.dc = ftcs::LocalTime::from_ns(sample->dc_ns);
   given.plant = ftcs::ReferenceTime::from_ns(sample->plant_ns);
   given.offset_ns = sample->offset_ns;

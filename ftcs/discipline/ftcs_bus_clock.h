@@ -52,7 +52,8 @@ typedef struct ftcs_bus_config {
 } ftcs_bus_config;
 
 typedef struct ftcs_bus_sample {
-  int32_t usable;    /* 0: the frame was lost, or plant time is not known */
+  int32_t usable;    /* 1: all of it; 2: all but plant_ns, which is not known in this cycle; 0:
+                        nothing, the frame was lost */
   int64_t dc_ns;     /* system time of the reference, 64 bits */
   int64_t plant_ns;  /* plant time at the same instant, on the same epoch */
   int64_t offset_ns; /* what had been added to 0x0920 when the system time was latched */

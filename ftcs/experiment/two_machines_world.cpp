@@ -55,12 +55,13 @@ void PlantReceiver::exchange(TrueTime sent) {
     source_.set(crystal_.reading_at(t));
     discipline_.on_pair(pair);
   };
-  const TrueTime arrival = sent + cable;
+  const TrueTime arrival = sent + cable + from_;
   hear(arrival, {Direction::kForward, grandmaster(sent), shown(arrival)});
   // The request leaves a third of an interval later; its answer is known soon after.
   const TrueTime request = sent + seconds(world_.sync_interval_s / 3.0);
-  const TrueTime known = request + cable + Duration::from_ns(20'000.0);
-  hear(known, {Direction::kBackward, grandmaster(request + cable), shown(request)});
+  const TrueTime heard = request + cable + to_;
+  const TrueTime known = heard + Duration::from_ns(20'000.0);
+  hear(known, {Direction::kBackward, grandmaster(heard), shown(request)});
 }
 
 void PlantReceiver::advance(TrueTime now) {

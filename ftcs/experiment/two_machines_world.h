@@ -28,6 +28,11 @@ class PlantReceiver {
   [[nodiscard]] std::optional<ReferenceTime> at(FreeRunningTime instant) const;
   /// The grandmaster shows so much more from now on; it is silent.
   void step(Duration by) noexcept { step_ = step_ + by; }
+  /// Another way to the grandmaster: so long more from it and to it than the cable is.
+  void take_another_path(Duration from, Duration to) noexcept {
+    from_ = from;
+    to_ = to;
+  }
   void set_silent(bool silent) noexcept { silent_ = silent; }
 
  private:
@@ -41,6 +46,8 @@ class PlantReceiver {
   ClockDiscipline discipline_;
   sim::TrueTime next_;
   Duration step_{};
+  Duration from_{};
+  Duration to_{};
   bool silent_ = false;
 };
 

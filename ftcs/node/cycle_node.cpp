@@ -110,8 +110,9 @@ void CycleNode::watch_bus(bool answered, const ethercat::FrameStamps& stamps) no
   const ethercat::CycleReport& report = main_.last_cycle();
   BusClockSample sample;
   // The servo's gates know a stamp that is wrong; after a lost frame the register is not certain.
-  sample.usable = answered && report.has_reference && stamps.has_system_time && offset_certain_ &&
-                  decision_.verdict == CycleVerdict::kUsed;
+  sample.has_dc = answered && report.has_reference && offset_certain_;
+  sample.usable =
+      sample.has_dc && stamps.has_system_time && decision_.verdict == CycleVerdict::kUsed;
   sample.dc = relabel<LocalTime>(report.reference);
   sample.plant = stamps.system_time + Duration{config_.servo.transit};
   sample.offset_ns = bus_offset_ns_;
