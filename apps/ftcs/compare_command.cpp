@@ -52,7 +52,9 @@ bool knows_servos(const std::vector<std::string>& wanted) {
 
 int compare_log(const CompareOptions& options) {
   const SweepOptions& files = options.sweep;
-  if (!knows_servos(files.servos)) return kUsageError;
+  std::vector<std::string> names = files.servos;
+  const auto libraries = load_servos(names);
+  if (!knows_servos(names)) return kUsageError;
   if (!can_write_results({files.json, files.csv, files.html, files.trace})) return kRuntimeError;
   auto log = experiment::read_recorded_log(options.log, options.source);
   if (!log) {
@@ -60,7 +62,7 @@ int compare_log(const CompareOptions& options) {
     return kRuntimeError;
   }
   LogComparison comparison{options.log, std::move(*log), {}};
-  comparison.servos = experiment::replay_log(comparison.log, files.servos);
+  comparison.servos = experiment::replay_log(comparison.log, names, libraries);
   if (!options.sweep.quiet) fmt::print("{}", log_console(comparison));
   bool written =
       files.json.empty() || write_result(files.json, dump(log_json(comparison, FTCS_VERSION)));

@@ -13,6 +13,7 @@
 #include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/progress.h"
+#include "apps/ftcs/sweep_options.h"
 #include "ftcs/daemon/ethercat/contour_live.h"
 #include "ftcs/report/cycle_report.h"
 #include "ftcs/report/paper_report.h"
@@ -28,6 +29,7 @@ struct PaperOptions {
   std::string json;
   std::string csv;
   std::string html;
+  std::vector<std::string> servos;  ///< files: servos of one's own
   std::uint64_t machine_seeds = 3;
   bool quiet = false;
   bool live = false;
@@ -47,11 +49,19 @@ std::vector<experiment::PaperTable> load_tables(const PaperOptions& options) {
 }
 
 int reproduce(const PaperOptions& options) {
+  std::vector<std::string> names = options.servos;
+  const auto libraries = load_servos(names);
+  if (!names.empty()) {
+    fmt::print(stderr, "ftcs paper: --servo adds a servo of your own, a .so or .py file; got {}\n",
+               names.front());
+    return kUsageError;
+  }
   const Interrupt interrupt;
   std::vector<experiment::PaperResult> results;
   if (!options.quiet) fmt::print("{}\n", algorithm_text());
-  for (const auto& table : load_tables(options)) {
+  for (auto& table : load_tables(options)) {
     if (interrupt.flag()) break;
+    for (const auto& library : libraries) experiment::add_servo(table, library);
     Progress progress;
     experiment::JobControl control;
     control.threads = options.threads;
@@ -125,6 +135,8 @@ void add_paper_command(CLI::App& app, int& exit_code) {
       ->add_option("--machine-seeds", options->machine_seeds,
                    "section 5: runs of two machines on one time; default 3")
       ->check(CLI::Range(1, 1000));
+  command->add_option("--servo", options->servos,
+                      "section 4: a row more for a servo of your own, a .so or .py file");
   command->add_option("--threads", options->threads, "0 = one for each core");
   command->add_option("--json", options->json,
                       "write all figures to this file; - = standard output");
@@ -136,6 +148,11 @@ void add_paper_command(CLI::App& app, int& exit_code) {
   command->callback([options, &exit_code] {
     if (options->live && options->section != "5") {
       fmt::print(stderr, "ftcs paper: --live belongs to --section 5\n");
+      exit_code = kUsageError;
+      return;
+    }
+    if (!options->servos.empty() && options->section != "4") {
+      fmt::print(stderr, "ftcs paper: --servo belongs to --section 4\n");
       exit_code = kUsageError;
       return;
     }

@@ -14,6 +14,7 @@
 #include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/progress.h"
+#include "ftcs/experiment/scenario_servos.h"
 #include "ftcs/experiment/toml_table.h"
 #include "ftcs/report/sweep_report.h"
 #include "ftcs/report/trace_plots.h"
@@ -42,16 +43,21 @@ experiment::Shard parse_shard(const std::string& text) {
 }
 
 void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
+  std::vector<std::string> names = options.servos;
+  const auto libraries = load_servos(names);
   for (Scenario& scenario : scenarios) {
     if (options.medians_only && scenario.fresh_seeds != 0) scenario.seeds = scenario.fresh_seeds;
     if (options.seeds != 0) scenario.seeds = options.seeds;
     if (options.first_seed != 0) scenario.first_seed = options.first_seed;
     if (!options.servos.empty()) {
       std::erase_if(scenario.servos, [&](const experiment::ScenarioServo& servo) {
-        return std::find(options.servos.begin(), options.servos.end(), servo.name) ==
-                   options.servos.end() &&
+        return std::find(names.begin(), names.end(), servo.name) == names.end() &&
                !experiment::is_bound(servo.name);
       });
+    }
+    for (const auto& library : libraries) {
+      scenario.servos.insert(scenario.servos.begin(),
+                             experiment::external_servo(library, scenario));
     }
     if (!options.medians_only) continue;
     for (auto& limit : scenario.limits) {
@@ -102,11 +108,24 @@ std::vector<experiment::RunTrace> traces_of(const std::vector<Scenario>& scenari
 
 }  // namespace
 
+std::vector<std::shared_ptr<const experiment::ServoLibrary>> load_servos(
+    std::vector<std::string>& servos) {
+  std::vector<std::shared_ptr<const experiment::ServoLibrary>> libraries;
+  for (const std::string& servo : servos) {
+    if (experiment::ServoLibrary::is_path(servo))
+      libraries.push_back(std::make_shared<const experiment::ServoLibrary>(servo));
+  }
+  std::erase_if(servos, &experiment::ServoLibrary::is_path);
+  return libraries;
+}
+
 void add_sweep_options(CLI::App& command, SweepOptions& options) {
   command.add_option("--seeds", options.seeds, "runs of each servo (default: in the file)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--first-seed", options.first_seed, "(default: in the file)");
-  command.add_option("--servo", options.servos, "only these servos (and the bound)");
+  command.add_option(
+      "--servo", options.servos,
+      "only these servos (and the bound); a file is a servo of your own: .so or .py");
   command.add_flag("--medians-only", options.medians_only,
                    "do not judge worst seeds and shares (for fresh seeds)");
   command.add_option("--threads", options.threads, "0 = one for each core");

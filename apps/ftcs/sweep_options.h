@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "ftcs/experiment/scenario_run.h"
+#include "ftcs/experiment/servo_library.h"
 
 namespace CLI {
 class App;
@@ -28,6 +30,11 @@ struct SweepOptions {
   std::string trace;  ///< sample by sample, the first seed of a single scenario
   bool quiet = false;
 };
+
+/// The servos of `--servo` that are files, loaded; their paths are taken out of `servos`. Throws
+/// std::runtime_error.
+[[nodiscard]] std::vector<std::shared_ptr<const experiment::ServoLibrary>> load_servos(
+    std::vector<std::string>& servos);
 
 void add_sweep_options(CLI::App& command, SweepOptions& options);
 

@@ -177,14 +177,21 @@ std::vector<std::string> replay_servo_names() {
   return names;
 }
 
-std::vector<ReplayResult> replay_log(const RecordedLog& log,
-                                     const std::vector<std::string>& servos) {
+std::vector<ReplayResult> replay_log(
+    const RecordedLog& log, const std::vector<std::string>& servos,
+    const std::vector<std::shared_ptr<const ServoLibrary>>& libraries) {
   std::vector<ReplayResult> results;
+  const bool all = servos.empty() && libraries.empty();
   for (const ServoKindName& entry : kServoKinds) {
-    const bool wanted =
-        servos.empty() || std::find(servos.begin(), servos.end(), entry.name) != servos.end();
+    const bool wanted = all || std::find(servos.begin(), servos.end(), entry.name) != servos.end();
     if (wanted)
       results.push_back(Replay(log, std::string(entry.name), config_for(entry.kind, log)).run());
+  }
+  for (const auto& library : libraries) {
+    DisciplineConfig config = config_for(ServoKind::kExternal, log);
+    const ServoInstance instance(*library, config.servo);
+    config.servo.external = instance.config();
+    results.push_back(Replay(log, library->name(), config).run());
   }
   if (log.steered) results.push_back(as_recorded(log));
   std::stable_sort(results.begin(), results.end(),

@@ -3,11 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/experiment/recorded_log.h"
+#include "ftcs/experiment/servo_library.h"
 
 namespace ftcs::experiment {
 
@@ -43,8 +45,9 @@ struct ReplayResult {
 /// Every servo of `servos` by name (empty: all) and, of a steered clock, the row "as recorded"; the
 /// best first (by true error where it is known, else by measured offset). A first step is allowed,
 /// as with ptp4l's defaults. Names must be of replay_servo_names().
-[[nodiscard]] std::vector<ReplayResult> replay_log(const RecordedLog& log,
-                                                   const std::vector<std::string>& servos = {});
+[[nodiscard]] std::vector<ReplayResult> replay_log(
+    const RecordedLog& log, const std::vector<std::string>& servos = {},
+    const std::vector<std::shared_ptr<const ServoLibrary>>& libraries = {});
 
 [[nodiscard]] std::vector<std::string> replay_servo_names();
 

@@ -20,10 +20,11 @@ double cycles_or_never(const std::optional<std::uint64_t>& cycles) {
 
 /// A whole servo where a control law is expected: forward messages alone, the path delay known to
 /// be zero.
+template <class Servo>
 class ForwardOnly {
  public:
-  explicit ForwardOnly(const AdaptiveConfig& config)
-      : servo_(std::make_unique<AdaptiveServo>(config)) {}
+  template <class Config>
+  explicit ForwardOnly(const Config& config) : servo_(std::make_unique<Servo>(config)) {}
 
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept {
     return servo_->update({Direction::kForward, sample.origin, sample.local, sample.free_running},
@@ -31,8 +32,16 @@ class ForwardOnly {
   }
 
  private:
-  std::unique_ptr<AdaptiveServo> servo_;  // kilobytes
+  std::unique_ptr<Servo> servo_;  // kilobytes
 };
+
+ServoConfig common_config(const sim::OneWaySpec& world) {
+  ServoConfig config;
+  config.sync_interval = Nanoseconds{world.interval.rounded_ns()};
+  config.limits = world.limits;
+  config.two_way.fixed_path_delay = Nanoseconds{0};
+  return config;
+}
 
 /// Runs the row's servo; `observe` sees every sample.
 template <class Observer>
@@ -43,8 +52,15 @@ void run_row(const PaperRow& row, std::uint64_t seed, Observer observe) {
   } else if (const auto* pics = std::get_if<PicsConfig>(&row.servo)) {
     PicsServo law(*pics);
     sim::run_one_way(row.world, seed, law, observe);
+  } else if (const auto* adaptive = std::get_if<AdaptiveConfig>(&row.servo)) {
+    ForwardOnly<AdaptiveServo> law(*adaptive);
+    sim::run_one_way(row.world, seed, law, observe);
   } else {
-    ForwardOnly law(std::get<AdaptiveConfig>(row.servo));
+    const ServoConfig common = common_config(row.world);
+    const ServoInstance instance(*std::get<ExternalPaperServo>(row.servo).library, common);
+    ExternalConfig config = instance.config();
+    config.fixed_path_delay = common.two_way.fixed_path_delay;
+    ForwardOnly<ExternalServo> law(config);
     sim::run_one_way(row.world, seed, law, observe);
   }
 }
@@ -87,8 +103,8 @@ double predicted_rms(const PaperRow& row) {
     // everywhere.
     return row.world.timestamp_noise_ns * std::sqrt(ftcs_noise_gain(ftcs->offset_gain).perceived);
   }
-  if (std::holds_alternative<AdaptiveConfig>(row.servo))
-    return kNotGiven;  // its gain falls with time
+  if (!std::holds_alternative<PicsConfig>(row.servo))
+    return kNotGiven;  // the adaptive servo's gain falls with time; another's is not known
   const auto& pics = std::get<PicsConfig>(row.servo);
   // The loop sees the oscillator's skew as a gain error: its additive steps are steps of the
   // oscillator's time.
@@ -139,6 +155,21 @@ void summarise(PaperRowResult& row) {
 bool PaperResult::passed() const noexcept {
   return complete && std::all_of(checks.begin(), checks.end(),
                                  [](const PaperCheckResult& c) { return c.passed || !c.demanded; });
+}
+
+void add_servo(PaperTable& table, const std::shared_ptr<const ServoLibrary>& library) {
+  std::vector<std::string> groups;
+  const std::vector<PaperRow> rows = table.rows;
+  for (const PaperRow& row : rows) {
+    if (row.support || std::find(groups.begin(), groups.end(), row.group) != groups.end()) continue;
+    groups.push_back(row.group);
+    PaperRow added;
+    added.name = library->name();
+    added.group = row.group;
+    added.world = row.world;
+    added.servo = ExternalPaperServo{library};
+    table.rows.push_back(std::move(added));
+  }
 }
 
 PaperResult run_paper_table(const PaperTable& table, const JobControl& control) {

@@ -69,6 +69,9 @@ struct PaperResult {
   [[nodiscard]] bool passed() const noexcept;
 };
 
+/// One more row for each group of the table: that servo in the world of the group's first row.
+void add_servo(PaperTable& table, const std::shared_ptr<const ServoLibrary>& library);
+
 /// Runs every row over every seed, the shipped servo on the virtual clock, common noise for all
 /// rows of a seed.
 [[nodiscard]] PaperResult run_paper_table(const PaperTable& table, const JobControl& control);

@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "ftcs/experiment/servo_library.h"
 #include "ftcs/servo/adaptive/adaptive_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/pics_servo.h"
@@ -18,13 +20,18 @@ namespace ftcs::experiment {
 
 inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
 
+/// A servo that somebody else wrote, given the row's interval and limits.
+struct ExternalPaperServo {
+  std::shared_ptr<const ServoLibrary> library;
+};
+
 /// A servo of the paper and what the paper and the model say of it.
 struct PaperRow {
   std::string name;
   std::string group;     ///< what distinguishes it from a row of the same name, e.g. "T = 500 us"
   bool support = false;  ///< needed by a check, not a row of the paper's table
   sim::OneWaySpec world;
-  std::variant<FtcsConfig, PicsConfig, AdaptiveConfig> servo;
+  std::variant<FtcsConfig, PicsConfig, AdaptiveConfig, ExternalPaperServo> servo;
   double paper_rms_ns = kNotGiven;
   double paper_cycles = kNotGiven;
   double model_rms_ns = kNotGiven;  ///< of the independent model, docs/paper-reproduction.md

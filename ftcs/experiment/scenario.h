@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,11 +14,14 @@
 
 namespace ftcs::experiment {
 
+class ServoLibrary;
+
 /// A servo under a name; everything but the servo itself is the scenario's.
 struct ScenarioServo {
   std::string name;
   ServoConfig config;
   bool clean_only = false;  ///< an oracle: it hears only messages that met nothing but jitter
+  std::shared_ptr<const ServoLibrary> library{};  ///< where somebody else wrote it
 };
 
 /// The name of the known-noise Kalman filter: the last row of every comparison.

@@ -6,6 +6,7 @@
 
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/experiment/figure_observer.h"
+#include "ftcs/experiment/servo_library.h"
 #include "ftcs/sim/ptp_network.h"
 
 namespace ftcs::experiment {
@@ -115,7 +116,13 @@ double ServoResult::share_within(double RunFigures::*figure, double limit) const
 RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo, std::uint64_t seed,
                         RunTrace* trace) {
   sim::TwoWaySpec world = scenario.world;
-  for (auto& node : world.nodes) node.discipline.servo = servo.config;
+  std::vector<ServoInstance> instances;  // one a clock, until the end of the run
+  for (auto& node : world.nodes) {
+    node.discipline.servo = servo.config;
+    if (!servo.library) continue;
+    instances.emplace_back(*servo.library, servo.config);
+    node.discipline.servo.external = instances.back().config();
+  }
   world.clean_only = servo.clean_only;
   if (trace != nullptr) trace->servo = servo.name;
   FigureObserver observer(scenario, trace);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "ftcs/analysis/statistics.h"
+#include "ftcs/experiment/servo_library.h"
 
 namespace ftcs::experiment {
 namespace {
@@ -252,6 +253,13 @@ StepPolicy read_step_policy(TomlTable& clock) {
     policy.threshold = Nanoseconds{v->rounded_ns()};
   }
   return policy;
+}
+
+ScenarioServo external_servo(std::shared_ptr<const ServoLibrary> library,
+                             const Scenario& scenario) {
+  ScenarioServo servo{library->name(), default_config(ServoKind::kExternal, scenario)};
+  servo.library = std::move(library);
+  return servo;
 }
 
 void read_servos(TomlTable& root, Scenario& scenario) {

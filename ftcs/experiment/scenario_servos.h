@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
+
 #include "ftcs/experiment/scenario.h"
 #include "ftcs/experiment/toml_table.h"
 
@@ -13,5 +15,9 @@ namespace ftcs::experiment {
 /// the end the known-noise Kalman bound with the noise of [bound] or, where that is silent, of
 /// [clock] and [path].
 void read_servos(TomlTable& root, Scenario& scenario);
+
+/// The servo of a library in this scenario, set as any other servo of it.
+[[nodiscard]] ScenarioServo external_servo(std::shared_ptr<const ServoLibrary> library,
+                                           const Scenario& scenario);
 
 }  // namespace ftcs::experiment

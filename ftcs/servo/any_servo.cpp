@@ -32,6 +32,12 @@ PairServoConfig with_delay(PairServoConfig servo, const ServoConfig& common) noe
   return with_common(servo, common);
 }
 
+ExternalConfig with_common(ExternalConfig servo, const ServoConfig& common) noexcept {
+  servo.path_delay = common.two_way.path_delay;
+  servo.fixed_path_delay = common.two_way.fixed_path_delay;
+  return servo;
+}
+
 }  // namespace
 
 std::string_view servo_kind_name(ServoKind kind) noexcept {
@@ -71,6 +77,10 @@ std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
       return validate(with_delay(config.kalman, config));
     case ServoKind::kMinimumDelay:
       return validate(with_delay(config.minimum_delay, config));
+    case ServoKind::kExternal:
+      return config.external.functions != nullptr && config.external.instance != nullptr
+                 ? std::nullopt
+                 : std::optional{ServoConfigError::kExternal};
   }
   return std::nullopt;
 }
@@ -103,6 +113,8 @@ AnyServo make_servo(const ServoConfig& config) noexcept {
     case ServoKind::kMinimumDelay:
       return AnyServo{std::in_place_type<MinimumDelayServo>,
                       with_delay(config.minimum_delay, config)};
+    case ServoKind::kExternal:
+      return AnyServo{std::in_place_type<ExternalServo>, with_common(config.external, config)};
     case ServoKind::kFreeRunning:
       break;
   }

@@ -13,6 +13,7 @@
 #include "ftcs/servo/baseline/minimum_delay_servo.h"
 #include "ftcs/servo/baseline/pid_servo.h"
 #include "ftcs/servo/baseline/regression_servo.h"
+#include "ftcs/servo/external_servo.h"
 #include "ftcs/servo/free_running_servo.h"
 #include "ftcs/servo/ftcs_servo.h"
 #include "ftcs/servo/linuxptp_pi_servo.h"
@@ -26,7 +27,7 @@ namespace ftcs {
 // A further servo needs one line in each of: ServoKind, kServoKinds, ServoConfig, AnyServo::Variant
 // and, in any_servo.cpp, make_servo and validate.
 
-/// The last five are baselines for comparison.
+/// The last five with a name are baselines for comparison.
 enum class ServoKind : std::uint8_t {
   kFtcs,
   kPics,
@@ -38,6 +39,7 @@ enum class ServoKind : std::uint8_t {
   kFrequencyCompensated,
   kKalman,
   kMinimumDelay,
+  kExternal,  ///< from a shared library; has no name here, since nothing can make it but its loader
 };
 
 struct ServoKindName {
@@ -75,6 +77,7 @@ struct ServoConfig {
   FrequencyCompensatedConfig frequency_compensated{};
   KalmanConfig kalman{};
   MinimumDelayConfig minimum_delay{};
+  ExternalConfig external{};
 };
 
 /// Of the chosen kind only.
@@ -87,7 +90,7 @@ class AnyServo {
       std::variant<TwoWayServo<FtcsServo>, TwoWayServo<PicsServo>, TwoWayServo<LinuxptpPiServo>,
                    TwoWayServo<FreeRunningServo>, AdaptiveServo, TwoWayServo<RegressionServo>,
                    TwoWayServo<PidServo>, TwoWayServo<FrequencyCompensatedServo>, KalmanServo,
-                   MinimumDelayServo>;
+                   MinimumDelayServo, ExternalServo>;
 
   /// In place: the adaptive servo is too large to pass through the stack of a real-time thread.
   template <class Servo, class... Configs>

@@ -21,6 +21,7 @@ enum class ServoConfigError : std::uint8_t {
   kActuator,
   kLearntState,
   kWindow,
+  kExternal,
 };
 
 /// One sentence: what was expected.
@@ -50,6 +51,8 @@ enum class ServoConfigError : std::uint8_t {
       return "latency, granularity and largest rate change must be finite and not negative";
     case ServoConfigError::kLearntState:
       return "a learnt state needs a rate within 50 % of nominal, deviation and noise above zero";
+    case ServoConfigError::kExternal:
+      return "a servo of a shared library needs its functions and an instance";
     case ServoConfigError::kWindow:
       return "a window must hold 1 to 4096 exchanges";
   }
