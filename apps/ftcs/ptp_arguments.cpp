@@ -134,6 +134,8 @@ void add_network_flags(CLI::App& command, PtpArguments& arguments) {
       ->check(integer_from(1, 65'535));
   flags.value("--unicast", arguments.unicast, "ADDRESS",
               "the only peer: an IPv4, IPv6 or Ethernet address");
+  flags.setting("--max-path-delay", "max_path_delay", arguments, "NS",
+                "a message whose path delay is longer steers nothing; 0: any");
   flags.value("--preset", arguments.preset, "NAME",
               preset_names() + ": settings that belong together");
   flags

@@ -256,6 +256,8 @@ constexpr std::array kSettings{
     PtpSetting{"free_running", "1: measure, do not steer", FTCS_SET(boolean(v, o.free_running))},
     PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
     PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
+    PtpSetting{"max_path_delay", "ns; a message with a longer one steers nothing; 0: any",
+               FTCS_SET(nanoseconds(v, o.max_path_delay))},
     PtpSetting{"max_frequency", "ppb", FTCS_SET(number_for(set_max_frequency, v, o.servo))},
     PtpSetting{"max_frequency_change", "ppb: as --max-frequency-change",
                FTCS_SET(number_for(set_max_frequency_change, v, o.steering))},

@@ -72,7 +72,8 @@ void add_steering_flags(CLI::App& command, SteeringArguments& arguments) {
   const std::array flags{
       Flag{"--servo", arguments.servo, "NAME", servo_names() + "; default adaptive"},
       Flag{"--max-frequency", arguments.max_frequency, "RATE",
-           "largest adjustment, for example 500ppm; 0: the clock's own limit"},
+           "largest adjustment, for example 100ppm; default 500ppm for the system clock, 0: the "
+           "clock's own limit"},
       Flag{"--max-frequency-change", arguments.max_frequency_change, "RATE",
            "adaptive: the clock's rate changes by no more at a time, for example 1ppm; 0: any"},
       Flag{"--frequency-granularity", arguments.frequency_granularity, "RATE",
@@ -136,7 +137,7 @@ Wrong check_steering(const ServoConfig& servo, const SteeringRules& rules) {
 
 Wrong set_max_frequency(double ppb, ServoConfig& servo) {
   if (ppb == 0.0) {
-    servo.limits = {};
+    servo.limits = RateLimits::symmetric_ppb(kLargestPpb);
     return std::nullopt;
   }
   if (auto wrong = outside(ppb, kSmallestFrequencyPpb, kLargestPpb, "ppb")) {

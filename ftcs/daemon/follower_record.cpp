@@ -13,7 +13,7 @@ namespace {
 
 // A slew over more than this would take long enough to look like a fault: the user must ask for a
 // step.
-constexpr Nanoseconds kLargestFirstOffset{1'000'000'000};
+constexpr Nanoseconds kLargestOffset{1'000'000'000};
 constexpr std::size_t kKeptRefusals = 8;
 
 StepPolicy step_policy(const PtpOptions& options) {
@@ -63,8 +63,8 @@ std::string plan_text(const JumpPlan& plan) {
     case JumpResponse::kRefused:
       break;
   }
-  return fmt::format("more than {} s is refused as a first offset is (--first-step allows a step)",
-                     kLargestFirstOffset.count() / 1e9);
+  return fmt::format("more than {} s is refused (--first-step allows a step)",
+                     kLargestOffset.count() / 1e9);
 }
 
 std::string foreign_text(const node::Note& note) {
@@ -91,10 +91,11 @@ node::ClockFollowerConfig follower_config(const PtpOptions& options, bool hardwa
   config.servo.adaptive.steering.first_step_allowed = options.first_step;
   config.servo.adaptive.learnt = learnt;
   config.step = step_policy(options);
-  config.largest_first_offset = kLargestFirstOffset;
+  config.largest_offset = kLargestOffset;
   config.largest_rate_change = options.steering.largest_rate_change;
   follower.peer_to_peer = options.peer_to_peer();
   follower.filter_is_chosen = options.delay_filter_given;
+  follower.largest_path_delay = options.max_path_delay;
   return follower;
 }
 
@@ -172,12 +173,25 @@ std::optional<std::string> FollowerRecord::add(const node::Note& note) {
       log_(LogLevel::kWarning, "{}: the reference jumped by {:+.9f} s: {}", label_,
            note.jump.seconds(), plan_text(note.plan));
       break;
-    case NoteKind::kFirstOffsetRefused:
-      return fmt::format(
-          "the first offset is {:.3f} s, more than {} s: set the clock near the reference{} or "
-          "allow one step (--first-step)",
-          note.offset.seconds(), kLargestFirstOffset.count() / 1e9,
-          options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
+    case NoteKind::kOffsetRefused:
+      log_(LogLevel::kWarning,
+           "{}: the offset is {:.3f} s, more than {} s: not followed, {} in a row; set the clock "
+           "near the reference{} or allow one step (--first-step)",
+           label_, note.offset.seconds(), kLargestOffset.count() / 1e9, note.times,
+           options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
+      break;
+    case NoteKind::kPathDelayRefused:
+      log_(LogLevel::kWarning,
+           "{}: the path delay is {:.0f} ns, more than --max-path-delay {} ns: not followed, {} "
+           "messages in a row",
+           label_, note.path_delay.ns(), options_.max_path_delay.count(), note.times);
+      break;
+    case NoteKind::kSaturated:
+      log_(LogLevel::kWarning,
+           "{}: the clock runs at its limit, {:+.0f} ppb, for {} samples; {:.6f} s are left "
+           "(--max-frequency)",
+           label_, discipline_.latest().applied_rate.ppb(), note.times, note.offset.seconds());
+      break;
     case NoteKind::kClockRefused:
       if (node::is_lasting(note.error)) return describe("the clock", note.error);
       log_(LogLevel::kWarning, "{}: {}", label_, describe("the clock", note.error));

@@ -124,9 +124,9 @@ TEST_F(MonitorReceiverTest, a_first_step_of_the_clock_is_no_jump_of_the_referenc
   EXPECT_LT(settled_at_s, 10.0);
 }
 
-TEST_F(MonitorReceiverTest, an_offset_of_seconds_ends_the_run_where_no_step_is_allowed) {
+TEST_F(MonitorReceiverTest, an_offset_of_seconds_is_not_followed_where_no_step_is_allowed) {
   kernel.system.time_ns = 5 * kSecond;
-  EXPECT_EQ(run(), kRuntimeError);
+  EXPECT_EQ(run(), kNotLocked);
   EXPECT_NEAR(kernel.system.steering(), 1.0, 1e-15) << "and touches nothing";
 }
 
@@ -143,6 +143,7 @@ TEST_F(MonitorReceiverTest, a_utc_offset_that_is_put_right_is_slewed_and_never_s
     last = error();
   };
   options.duration = Duration::from_ns(120 * kSecond);
+  options.servo.limits = RateLimits::symmetric_ppb(100e6);  // else a second takes half an hour
   EXPECT_EQ(run(), kSuccess);
   EXPECT_NEAR(error(), 0.0, 100.0);
   EXPECT_LT(largest_move, 0.1 * kSecond);

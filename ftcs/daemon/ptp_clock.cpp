@@ -72,7 +72,8 @@ Result<PtpClocks, std::string> open_ptp_clocks(platform::Kernel& kernel, const P
   auto device = open_device(kernel, options, clocks.timestamps->is_hardware());
   if (!device) return device.error();
   const std::string name = device->name();
-  platform::KernelClock clock(std::move(*device), options.servo.limits, !options.free_running);
+  const RateLimits limits = steering_limits(*device, options.servo.limits);
+  platform::KernelClock clock(std::move(*device), limits, !options.free_running);
   if (const auto error = clock.failure()) return describe(name, *error);
   log(LogLevel::kInfo, "{}: {}, limits {:+.0f} to {:+.0f} ppb", name,
       options.free_running ? "read only" : "steered", clock.rate_limits().slowest.ppb(),

@@ -85,6 +85,7 @@ struct PtpOptions {
   Nanoseconds delay_asymmetry{0};
 
   ServoConfig servo = ptp_servo_defaults();
+  Nanoseconds max_path_delay{0};    ///< 0: any
   bool delay_filter_given = false;  ///< by the user: the adaptive servo has a default of its own
   SteeringRules steering{};
   node::EpochRules epoch{};

@@ -116,6 +116,10 @@ void PtpReceiver::tell(const ptp::Action& action) {
           to_text(seen->port).view());
   } else if (const auto* selected = std::get_if<ptp::TransmitterSelected>(&action)) {
     on_selected(*selected);
+  } else if (const auto* doubted = std::get_if<ptp::TransmitterDoubted>(&action)) {
+    log()(LogLevel::kWarning,
+          "port 1 ({}): transmitter {} tells another time than ours: any other is preferred",
+          options().interface, to_text(doubted->port).view());
   }
 }
 

@@ -13,6 +13,13 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 }  // namespace
 
+RateLimits steering_limits(const platform::ClockDevice& device, const RateLimits& chosen) {
+  constexpr double kUsualPpb = 500e3;
+  constexpr RateLimits kNone{};
+  const bool none_chosen = chosen.slowest == kNone.slowest && chosen.fastest == kNone.fastest;
+  return device.is_system() && none_chosen ? RateLimits::symmetric_ppb(kUsualPpb) : chosen;
+}
+
 std::string describe(const std::string& clock, ClockError error) {
   switch (error) {
     case ClockError::kNotPermitted:

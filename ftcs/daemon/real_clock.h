@@ -80,6 +80,11 @@ class RealClock final : public node::ReferenceGate {
   bool expiry_said_ = false;
 };
 
+/// The chosen limits; where none were chosen, CLOCK_REALTIME runs at most 500 ppm off, as every
+/// kernel's adjtimex() has it and programs expect.
+[[nodiscard]] RateLimits steering_limits(const platform::ClockDevice& device,
+                                         const RateLimits& chosen);
+
 /// "CLOCK_REALTIME: not permitted", for a log line.
 [[nodiscard]] std::string describe(const std::string& clock, ClockError error);
 

@@ -94,7 +94,9 @@ Telemetry ClockDiscipline::on_silence() noexcept {
 void ClockDiscipline::on_new_reference() noexcept {
   servo_.reset();
   lock_.reset();
+  awaits_sample_ = has_sample_ || awaits_sample_;
   has_sample_ = false;
+  waiting_since_ = clock_.read().free_running;
   last_gap_ = Duration{};
   announced_interval_ = Duration{};
   in_holdover_ = false;
@@ -110,7 +112,7 @@ void ClockDiscipline::on_new_timescale() noexcept {
 }
 
 JumpPlan ClockDiscipline::on_reference_jump(Duration jump) noexcept {
-  const Nanoseconds largest = config_.largest_first_offset;
+  const Nanoseconds largest = config_.largest_offset;
   const bool is_beginning = largest > Nanoseconds{0} && abs(jump) > Duration{largest};
   if (is_beginning) {
     on_new_timescale();
@@ -180,6 +182,7 @@ void ClockDiscipline::note_sample(const EventPair& pair) noexcept {
   }
   last_sample_ = pair;
   has_sample_ = true;
+  awaits_sample_ = false;
   in_holdover_ = false;
 }
 
@@ -187,8 +190,9 @@ void ClockDiscipline::check_silence(const ClockReading& reading) noexcept {
   const bool configured = config_.servo.sync_interval > Nanoseconds{0};
   const Duration interval =
       configured ? sync_interval_ : std::max(sync_interval_, announced_interval_);
-  if (!has_sample_ || in_holdover_ || interval <= Duration{}) return;
-  const double silence_ns = (reading.free_running - last_sample_.free_running).ns();
+  if (!(has_sample_ || awaits_sample_) || in_holdover_ || interval <= Duration{}) return;
+  const FreeRunningTime since = has_sample_ ? last_sample_.free_running : waiting_since_;
+  const double silence_ns = (reading.free_running - since).ns();
   if (silence_ns <= interval.ns() * config_.missed_intervals_to_holdover) return;
   in_holdover_ = true;
   ++counters_.holdovers;
@@ -222,9 +226,8 @@ void ClockDiscipline::steer(const ServoCommand& wanted, Duration offset) noexcep
 }
 
 bool ClockDiscipline::refuses(Duration offset) const noexcept {
-  return first_command_ && config_.largest_first_offset > Nanoseconds{0} &&
-         !config_.step.permits(first_command_) &&
-         abs(offset) > Duration{config_.largest_first_offset};
+  return config_.largest_offset > Nanoseconds{0} && !config_.step.permits(first_command_) &&
+         abs(offset) > Duration{config_.largest_offset};
 }
 
 ServoCommand ClockDiscipline::with_step(ServoCommand command, Duration offset) const noexcept {

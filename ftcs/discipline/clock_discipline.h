@@ -18,9 +18,10 @@ struct DisciplineConfig {
   ServoConfig servo{};  ///< its limits are narrowed by the clock's own
   StepPolicy step{};
   LockConfig lock{};
-  /// A larger first offset is not steered but refused, message by message: a slew over seconds is a
-  /// mistake of the set-up. Zero: no bound. Not asked where the policy permits a step.
-  Nanoseconds largest_first_offset{0};
+  /// A larger offset is not steered but refused, message by message, and the clock keeps its rate:
+  /// a slew over seconds is a mistake of the set-up, or somebody's lie. Zero: no bound. Not asked
+  /// where the policy permits a step.
+  Nanoseconds largest_offset{0};
   /// The rate of the clock changes by no more at a time, dimensionless. Zero: any. The adaptive
   /// servo plans with it, any other is cut.
   double largest_rate_change = 0.0;
@@ -57,10 +58,10 @@ class ClockDiscipline {
   /// Another time transmitter: what was learnt about the old one is void; the clock keeps its rate.
   void on_new_reference() noexcept;
   /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:
-  /// step policy and largest_first_offset are asked again as with the first offset.
+  /// step policy is asked again as with the first offset.
   void on_new_timescale() noexcept;
   /// The same reference has jumped; positive: ahead. A new reference, and beyond
-  /// largest_first_offset a beginning, as on_new_timescale(). Tells what will happen.
+  /// largest_offset a beginning, as on_new_timescale(). Tells what will happen.
   JumpPlan on_reference_jump(Duration jump) noexcept;
 
   [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
@@ -99,6 +100,8 @@ class ClockDiscipline {
   bool first_command_ = true;
   bool in_holdover_ = false;
   bool has_sample_ = false;
+  bool awaits_sample_ = false;  ///< of another reference, since waiting_since_
+  FreeRunningTime waiting_since_{};
   EventPair last_sample_{};
   /// Configured, or the shorter one of the last two gaps between samples: an outage is no interval.
   Duration sync_interval_{};

@@ -11,7 +11,7 @@ namespace ftcs {
 enum class JumpResponse : std::uint8_t {
   kSlewed,   ///< the clock follows by its rate
   kStepped,  ///< the step policy permits one step
-  kRefused,  ///< farther than largest_first_offset, and no step is permitted: as at the start
+  kRefused,  ///< farther than largest_offset, and no step is permitted: as at the start
 };
 
 struct JumpPlan {

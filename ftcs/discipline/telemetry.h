@@ -20,7 +20,7 @@ struct DisciplineCounters {
   std::uint64_t commands = 0;     ///< taken by the clock
   std::uint64_t steps = 0;
   std::uint64_t clamps = 0;   ///< commands that run at a limit
-  std::uint64_t refused = 0;  ///< first offsets beyond largest_first_offset: not acted on
+  std::uint64_t refused = 0;  ///< offsets beyond largest_offset: not acted on
   std::uint64_t apply_errors = 0;
   std::uint64_t holdovers = 0;
   std::uint64_t new_references = 0;
@@ -38,7 +38,7 @@ struct Telemetry {
   Rate tracking_rate{};    ///< what the clock runs at once the correction has expired
   bool commanded = false;  ///< this message made a command, and the clock took it
   Duration step{};         ///< that came with it
-  bool offset_refused = false;        ///< the first offset exceeds largest_first_offset
+  bool offset_refused = false;        ///< the offset exceeds largest_offset
   bool locked = false;                ///< LockDetector
   std::optional<ClockError> error{};  ///< the clock refused the command
 };

@@ -32,6 +32,14 @@ PathDelayConfig link_delay_config(const ClockFollowerConfig& config) noexcept {
   return link;
 }
 
+// Of what a row of commands at a limit is worth telling.
+constexpr std::uint32_t kSaturatedFrom = 8;
+// How well the oscillator's rate is known: as bad as any that a clock is allowed, and once locked.
+constexpr double kUnknownRate = 500e-6;
+constexpr double kKnownRate = 1e-6;
+
+constexpr bool is_power_of_two(std::uint32_t times) noexcept { return (times & (times - 1)) == 0; }
+
 Note note(NoteKind kind) noexcept {
   Note result;
   result.kind = kind;
@@ -46,7 +54,8 @@ ClockFollower::ClockFollower(const ClockFollowerConfig& config, AdjustableClock&
       clock_(clock),
       gate_(gate),
       discipline_(discipline_config(config), clock),
-      link_delay_(link_delay_config(config)) {}
+      link_delay_(link_delay_config(config)),
+      path_limit_(config.largest_path_delay) {}
 
 bool ClockFollower::admits(const EventPair& pair) noexcept {
   return gate_ == nullptr || gate_->admits(pair.reference, pair.free_running);
@@ -64,6 +73,7 @@ void ClockFollower::follow(const EventPair& pair, std::optional<Duration> sync_i
     }
     follow_timescale(pair);
   }
+  if (!config_.peer_to_peer && !path_is_short(pair)) return;
   discipline_.on_announced_interval(sync_interval.value_or(Duration{}));
   hear_response(pair.free_running);
   const Steered steered = steer(pair, true);
@@ -80,8 +90,10 @@ Steered ClockFollower::steer(EventPair pair, bool paces) noexcept {
   result.event = pair.free_running;
   result.paces = paces;
   result.local = clock_.local_at(pair.free_running);
+  const std::uint64_t clamps = discipline_.counters().clamps;
   result.telemetry = discipline_.on_pair(pair, paces);
   note_refusals(result.telemetry);
+  note_saturation(result.telemetry, discipline_.counters().clamps != clamps);
   Duration& path_delay = result.telemetry.servo.path_delay;
   result.perceived = offset_from_reference(result.local, pair.reference + path_delay);
   path_delay += delay;
@@ -97,9 +109,40 @@ void ClockFollower::note_refusals(const Telemetry& telemetry) noexcept {
     tell(refused);
   }
   clock_refuses_ = refuses;
-  if (!telemetry.offset_refused) return;
-  Note refused = note(NoteKind::kFirstOffsetRefused);
+  if (telemetry.commanded) refused_offsets_ = 0;
+  if (!telemetry.offset_refused || !is_power_of_two(++refused_offsets_)) return;
+  Note refused = note(NoteKind::kOffsetRefused);
   refused.offset = telemetry.servo.offset;
+  refused.times = refused_offsets_;
+  tell(refused);
+}
+
+void ClockFollower::note_saturation(const Telemetry& telemetry, bool at_limit) noexcept {
+  if (!telemetry.commanded) return;
+  saturated_ = at_limit ? saturated_ + 1 : 0;
+  if (saturated_ < kSaturatedFrom || !is_power_of_two(saturated_)) return;
+  Note saturated = note(NoteKind::kSaturated);
+  saturated.offset = telemetry.servo.offset;
+  saturated.times = saturated_;
+  tell(saturated);
+}
+
+bool ClockFollower::path_is_short(const EventPair& pair) noexcept {
+  const double doubt = discipline_.locked() ? kKnownRate : kUnknownRate;
+  const auto excess = path_limit_.excess(pair, discipline_.latest().tracking_rate, doubt);
+  if (!excess) {
+    refused_paths_ = 0;
+    return true;
+  }
+  refuse_path(*excess);
+  return false;
+}
+
+void ClockFollower::refuse_path(Duration delay) noexcept {
+  if (!is_power_of_two(++refused_paths_)) return;
+  Note refused = note(NoteKind::kPathDelayRefused);
+  refused.path_delay = delay;
+  refused.times = refused_paths_;
   tell(refused);
 }
 
@@ -170,6 +213,8 @@ bool ClockFollower::hears_stamps() const noexcept {
 
 void ClockFollower::on_link_delay(const ptp::EmitPeerDelay& measured,
                                   std::optional<Duration> sync_interval) noexcept {
+  if (path_limit_.exceeds(measured.mean_link_delay)) return refuse_path(measured.mean_link_delay);
+  refused_paths_ = 0;
   if (!link_delay_.add(measured.mean_link_delay, measured.first)) return;
   if (measured.first && shares_timescale() && is_another_link(measured.mean_link_delay)) {
     forget_stamps();
@@ -183,18 +228,22 @@ void ClockFollower::on_link_delay(const ptp::EmitPeerDelay& measured,
 }
 
 void ClockFollower::on_new_link() noexcept {
+  path_limit_.reset();
   link_delay_.reset();
   waiting_.reset();
   response_.reset();
 }
 
 void ClockFollower::on_new_reference() noexcept {
+  path_limit_.reset();
+  refused_offsets_ = 0;
   waiting_.reset();
   forget_stamps();
   discipline_.on_new_reference();
 }
 
 void ClockFollower::on_reference_jump(Duration jump) noexcept {
+  path_limit_.reset();
   waiting_.reset();
   forget_stamps();
   Note jumped = note(NoteKind::kReferenceJumped);

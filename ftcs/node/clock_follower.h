@@ -11,6 +11,7 @@
 #include "ftcs/measurement/link_delay.h"
 #include "ftcs/measurement/shared_timescale.h"
 #include "ftcs/node/follower_event.h"
+#include "ftcs/node/path_limit.h"
 #include "ftcs/node/reference_gate.h"
 #include "ftcs/ptp/actions.h"
 
@@ -24,6 +25,8 @@ struct ClockFollowerConfig {
   /// Of the link delay, by discipline.servo.two_way.path_delay.filter, even for the adaptive servo.
   /// Without it that servo has a steady mean, and hears the neighbour's stamps too (decision 0015).
   bool filter_is_chosen = false;
+  /// A message whose path delay is beyond this steers nothing (PathLimit). Zero: no limit.
+  Nanoseconds largest_path_delay{0};
 };
 
 /// What stands between a source of timestamps and the discipline of a clock: which stamps steer, in
@@ -78,6 +81,9 @@ class ClockFollower {
   void follow(const EventPair& pair, std::optional<Duration> sync_interval) noexcept;
   [[nodiscard]] Steered steer(EventPair pair, bool paces) noexcept;
   void note_refusals(const Telemetry& telemetry) noexcept;
+  void note_saturation(const Telemetry& telemetry, bool at_limit) noexcept;
+  [[nodiscard]] bool path_is_short(const EventPair& pair) noexcept;
+  void refuse_path(Duration delay) noexcept;
   void hear_stamps(const ptp::PeerStamps& stamps) noexcept;
   void hear_response(FreeRunningTime before) noexcept;
   void follow_timescale(const EventPair& sync) noexcept;
@@ -109,6 +115,10 @@ class ClockFollower {
   bool in_holdover_ = false;
   std::uint32_t refused_syncs_ = 0;  ///< in a row
   bool clock_refuses_ = false;
+  PathLimit path_limit_;
+  std::uint32_t refused_offsets_ = 0;  ///< in a row, as the next two
+  std::uint32_t refused_paths_ = 0;
+  std::uint32_t saturated_ = 0;
   std::array<FollowerEvent, kMostEvents> events_{};
   std::size_t told_ = 0;
   std::size_t taken_ = 0;

@@ -130,16 +130,53 @@ TEST_F(Decisions, silence_is_told_once_and_with_the_syncs_that_came_in_vain) {
 }
 
 TEST_F(Decisions, a_first_offset_beyond_its_bound_is_told_with_each_message_and_not_steered) {
-  config.discipline.largest_first_offset = Nanoseconds{kSecond};
+  config.discipline.largest_offset = Nanoseconds{kSecond};
   begin(Duration::from_whole_ns(37 * kSecond));
   for (int i = 0; i < 4; ++i) {
     sync();
     request();
   }
   ASSERT_FALSE(notes.empty());
-  EXPECT_EQ(notes[0].kind, NoteKind::kFirstOffsetRefused);
+  EXPECT_EQ(notes[0].kind, NoteKind::kOffsetRefused);
   EXPECT_NEAR(notes[0].offset.seconds(), 37.0, 1e-3);
   EXPECT_EQ(follower->discipline().counters().commands, 0U);
+}
+
+TEST_F(Decisions, a_path_longer_than_its_limit_steers_nothing_and_is_told_seldom) {
+  config.largest_path_delay = Nanoseconds{100'000};
+  begin();
+  for (int i = 0; i < 20; ++i) {
+    sync();
+    request();
+  }
+  const std::uint64_t used = follower->discipline().counters().used;
+  EXPECT_EQ(used, 20U);
+  notes.clear();
+  for (int i = 0; i < 16; ++i) {
+    sync(kLink, 300'000);
+    request();
+  }
+  EXPECT_EQ(follower->discipline().counters().used, used);
+  ASSERT_EQ(kinds(), std::vector(6, NoteKind::kPathDelayRefused)) << "1, 2, 4, 8, 16 and 32";
+  EXPECT_NEAR(notes[1].path_delay.ns(), 150'000.0 + kLink, 10.0);
+  for (int i = 0; i < 4; ++i) {
+    sync();
+    request();
+  }
+  EXPECT_EQ(follower->discipline().counters().used, used + 4U) << "back at once";
+}
+
+TEST_F(Decisions, a_clock_at_its_limit_is_told_with_what_is_left) {
+  config.discipline.servo.kind = ServoKind::kFtcs;
+  config.discipline.servo.limits = RateLimits::symmetric_ppb(500e3);
+  begin(Duration::from_whole_ns(kSecond / 2));
+  for (int i = 0; i < 20; ++i) {
+    sync();
+    request();
+  }
+  ASSERT_EQ(kinds(), (std::vector{NoteKind::kSaturated, NoteKind::kSaturated}));
+  EXPECT_EQ(notes[1].times, 16U);
+  EXPECT_NEAR(notes[0].offset.seconds(), 0.5, 0.01);
 }
 
 TEST_F(Decisions, a_clock_that_refuses_is_told_once_for_a_series) {
@@ -195,7 +232,7 @@ TEST_F(PeerDecisions, stamps_that_depart_are_told_by_how_much_and_the_start_is_a
 }
 
 TEST_F(Decisions, a_jump_of_the_reference_is_told_with_what_becomes_of_it) {
-  config.discipline.largest_first_offset = std::chrono::seconds{1};
+  config.discipline.largest_offset = std::chrono::seconds{1};
   begin();
   for (int i = 0; i < 20; ++i) {
     sync();

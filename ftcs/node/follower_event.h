@@ -30,9 +30,11 @@ enum class NoteKind : std::uint8_t {
   kNeighbourIsAnother,  ///< exchanges are with somebody else than the transmitter: begins anew
   kAnotherLink,         ///< the delay of the link contradicts what was learnt: begins anew
   kHoldover,            ///< no usable Sync for a while; refused_syncs came in vain. Rate is kept
-  kFirstOffsetRefused,  ///< offset exceeds DisciplineConfig::largest_first_offset: not steered
-  kClockRefused,        ///< error; the first of a series of commands that the clock did not take
-  kReferenceJumped,     ///< by jump; plan is what becomes of it
+  kOffsetRefused,  ///< offset exceeds DisciplineConfig::largest_offset: not steered, times in a row
+  kPathDelayRefused,  ///< path_delay exceeds ClockFollowerConfig::largest_path_delay, as above
+  kSaturated,         ///< commands at a limit of the rate, times in a row; offset is what is left
+  kClockRefused,      ///< error; the first of a series of commands that the clock did not take
+  kReferenceJumped,   ///< by jump; plan is what becomes of it
 };
 
 /// Fields that a kind does not name are zero.
@@ -41,6 +43,8 @@ struct Note {
   double difference_ns = 0.0;
   std::uint32_t refused_syncs = 0;  ///< in a row
   Duration offset{};                ///< local minus reference
+  Duration path_delay{};
+  std::uint32_t times = 0;  ///< told with the first of a row, then each time that it has doubled
   ClockError error{};
   Duration jump{};  ///< of the reference, positive: ahead
   JumpPlan plan{};

@@ -61,9 +61,10 @@ void ReceiverNode::take(const ptp::ActionList& actions, FreeRunningTime now) noe
 std::optional<ReceiverEvent> ReceiverNode::next() noexcept {
   for (;;) {
     if (const auto event = follower_.next()) {
+      if (const auto* steered = std::get_if<Steered>(&*event)) count_refusals(steered->telemetry);
       return std::visit([](const auto& told) { return ReceiverEvent{told}; }, *event);
     }
-    if (std::exchange(pair_was_fed_, false)) tell_port_of_lock(now_);
+    if (std::exchange(pair_was_fed_, false)) tell_port_of_pair(now_);
     if (lock_actions_taken_ < lock_actions_.size()) return lock_actions_[lock_actions_taken_++];
     if (taken_ == actions_.size()) return std::nullopt;
     const ptp::Action& action = actions_[taken_++];
@@ -90,6 +91,19 @@ bool ReceiverNode::keeps(const ptp::Action& action) noexcept {
     follower_.on_reference_jump(jumped->jump);
   }
   return false;
+}
+
+void ReceiverNode::count_refusals(const Telemetry& telemetry) noexcept {
+  if (telemetry.commanded) refusals_ = 0;
+  if (telemetry.offset_refused) ++refusals_;
+}
+
+// A transmitter whose time is refused again and again makes room for any other.
+void ReceiverNode::tell_port_of_pair(FreeRunningTime now) noexcept {
+  if (refusals_ < kRefusalsToDoubt) return tell_port_of_lock(now);
+  refusals_ = 0;
+  lock_actions_ = port_.on_transmitter_doubted(now);
+  lock_actions_taken_ = 0;
 }
 
 // From the port's state and not from a change of the lock: after a fault shorter than the lock's

@@ -80,7 +80,9 @@ class ReceiverNode {
  private:
   void take(const ptp::ActionList& actions, FreeRunningTime now) noexcept;
   [[nodiscard]] bool keeps(const ptp::Action& action) noexcept;
+  void count_refusals(const Telemetry& telemetry) noexcept;
   void tell_port_of_lock(FreeRunningTime now) noexcept;
+  void tell_port_of_pair(FreeRunningTime now) noexcept;
 
   ptp::TimeReceiver port_;
   ClockFollower follower_;
@@ -90,6 +92,9 @@ class ReceiverNode {
   std::size_t taken_ = 0;           ///< of actions_
   ptp::ActionList lock_actions_{};  ///< what the port makes of locked or not
   std::size_t lock_actions_taken_ = 0;
+  /// In a row; with so many the transmitter is doubted.
+  static constexpr int kRefusalsToDoubt = 3;
+  int refusals_ = 0;
   bool pair_was_fed_ = false;  ///< and the port does not know yet what came of it
 };
 

@@ -87,15 +87,21 @@ struct TransmitterSelected {
   bool changed = false;  ///< port or grandmaster differ from the last selection: another reference
 };
 
-/// The reference advanced differently from our oscillator by more than kJumpTolerance between two
-/// Syncs; the pair that follows already shows the new time. Positive: the reference leapt forward.
+/// The selected transmitter tells a time that nobody wants to follow; any other is preferred.
+struct TransmitterDoubted {
+  PortIdentity port{};
+};
+
+/// The reference advanced differently from our oscillator by more than kJumpTolerance, and several
+/// Syncs agree (ReferenceWatch); the pair that follows already shows the new time. Positive: the
+/// reference leapt forward.
 struct ReferenceJumped {
   Duration jump{};
 };
 
 using Action =
     std::variant<SendMessage, EmitPair, EmitPeerDelay, SenderIsTransmitter, PortStateChanged,
-                 TransmitterSeen, TransmitterSelected, ReferenceJumped>;
+                 TransmitterSeen, TransmitterSelected, TransmitterDoubted, ReferenceJumped>;
 
 /// What an input brought about, in order. A value: actions may feed new inputs while the list is
 /// walked.

@@ -69,18 +69,25 @@ ForeignTransmitters::Heard ForeignTransmitters::hear(const TransmitterData& data
                    .data = data,
                    .announce_interval = announce_interval,
                    .last = now,
-                   .before_last = record->last};
+                   .before_last = record->last,
+                   .doubted_until = record->doubted_until};
   return known ? Heard::kKnown : Heard::kNew;
 }
 
 const TransmitterData* ForeignTransmitters::best(const PortIdentity& selected, FreeRunningTime now,
                                                  bool first_suffices) const noexcept {
   const TransmitterData* best = nullptr;
+  bool best_is_doubted = false;
   for (const Record& record : records_) {
     if (!record.used || !(record.data.port == selected || qualified(record, now, first_suffices))) {
       continue;
     }
-    if (best == nullptr || better(record.data, *best)) best = &record.data;
+    const bool doubted = record.doubted_until && now < *record.doubted_until;
+    const bool wins = best == nullptr ||
+                      (doubted == best_is_doubted ? better(record.data, *best) : best_is_doubted);
+    if (!wins) continue;
+    best = &record.data;
+    best_is_doubted = doubted;
   }
   return best;
 }
@@ -97,6 +104,12 @@ std::optional<FreeRunningTime> ForeignTransmitters::last_heard(
   const Record* const record = find(port);
   if (record == nullptr) return std::nullopt;
   return record->last;
+}
+
+void ForeignTransmitters::doubt(const PortIdentity& port, FreeRunningTime now) noexcept {
+  for (Record& record : records_) {
+    if (record.used && record.data.port == port) record.doubted_until = now + Duration{kDoubtTime};
+  }
 }
 
 void ForeignTransmitters::forget(const PortIdentity& port) noexcept {

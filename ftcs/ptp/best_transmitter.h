@@ -44,6 +44,9 @@ class ForeignTransmitters {
   /// None: not in the table.
   [[nodiscard]] std::optional<FreeRunningTime> last_heard(const PortIdentity& port) const noexcept;
 
+  /// What was refused is worse than any other for so long, or until it has fallen silent.
+  static constexpr Nanoseconds kDoubtTime{300'000'000'000};
+  void doubt(const PortIdentity& port, FreeRunningTime now) noexcept;
   void forget(const PortIdentity& port) noexcept;
   void clear() noexcept { records_ = {}; }
 
@@ -55,6 +58,7 @@ class ForeignTransmitters {
     Duration announce_interval{};
     FreeRunningTime last{};
     FreeRunningTime before_last{};
+    std::optional<FreeRunningTime> doubted_until{};
   };
   [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now,
                                       bool first_suffices) noexcept;

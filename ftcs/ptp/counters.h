@@ -93,6 +93,7 @@ enum class Counter : std::uint8_t {
   kNegativeCorrection,  ///< used: 11.6 may make it negative
   kAbsurdCorrection,    ///< beyond kMaximumCorrection: the message is dropped
   kBadInterval,         ///< logMessageInterval outside of the profile: the old value stays
+  kDoubtedTime,  ///< a time that contradicts the Syncs before, not yet said often enough: dropped
   kReferenceJumps,  ///< the reference leapt against our oscillator: reported, open exchanges are
                     ///< forgotten
   kUnusableTime,    ///< a time that no Timestamp can carry: the message is not sent
@@ -100,8 +101,9 @@ enum class Counter : std::uint8_t {
   kTransmitterChanges,
   kAnnounceTimeouts,  ///< the selected transmitter stopped: back to LISTENING, or to the next best
                       ///< one
-  kForeignTableFull,  ///< a newcomer was ignored
-  kSyncTimeouts,      ///< its Syncs stopped while it still announces (syncReceiptTimeout): as above
+  kDoubtedTransmitters,  ///< the selected one tells a time that was refused: others are preferred
+  kForeignTableFull,     ///< a newcomer was ignored
+  kSyncTimeouts,  ///< its Syncs stopped while it still announces (syncReceiptTimeout): as above
   kUnacceptableTransmitter,  ///< not in the table of acceptable ones (17.5): dropped
   kUnusableAnnounce,  ///< 255 steps removed or more, or a clock that claims our identity (9.3.2.5)
   kLinkDown,

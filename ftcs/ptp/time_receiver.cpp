@@ -153,6 +153,16 @@ ActionList TimeReceiver::on_servo_unlocked(FreeRunningTime) noexcept {
   return actions;
 }
 
+ActionList TimeReceiver::on_transmitter_doubted(FreeRunningTime now) noexcept {
+  ActionList actions;
+  if (!has_transmitter_) return actions;
+  port_.count(Counter::kDoubtedTransmitters);
+  foreign_.doubt(transmitter_.port, now);
+  port_.push(TransmitterDoubted{transmitter_.port}, actions);
+  decide(now, actions);
+  return actions;
+}
+
 std::optional<FreeRunningTime> TimeReceiver::deadline() const noexcept {
   auto next = earlier(delay_requests_.deadline(), peer_delay_.deadline());
   if (!has_transmitter_) return next;
@@ -230,7 +240,7 @@ void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
   // t2 = t1 + (mean + asymmetry) + offset and t4 = t3 + (mean - asymmetry) - offset: added to both,
   // the mean remains.
   pair->reference = pair->reference + config_.delay_asymmetry;
-  if (pair->direction == Direction::kForward) check_for_jump(*pair, now, actions);
+  if (!believes(*pair, now, actions)) return;
   if (!has_transmitter_) return fast_start_.keep(*pair);
   if (pair->direction == Direction::kForward && servo_locked_ &&
       port_.state() == PortState::kUncalibrated) {
@@ -239,15 +249,24 @@ void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
   deliver(*pair, actions);
 }
 
-void TimeReceiver::check_for_jump(const EventPair& forward, FreeRunningTime now,
-                                  ActionList& actions) noexcept {
-  const LastPair last = last_forward_;
-  last_forward_ = LastPair{true, forward};
-  if (!last.known) return;
-  const Duration elapsed = forward.free_running - last.pair.free_running;
-  const Duration jump = (forward.reference - last.pair.reference) - elapsed;
-  const Duration tolerance = Duration{kJumpTolerance} + abs(elapsed).half().half().half();
-  if (abs(jump) <= tolerance) return;
+/// Whether the pair tells the time as those before it, or one that was told often enough.
+bool TimeReceiver::believes(const EventPair& pair, FreeRunningTime now,
+                            ActionList& actions) noexcept {
+  ReferenceWatch::Finding found;
+  if (pair.direction == Direction::kForward) {
+    found = reference_.on_sync(pair);
+  } else if (!reference_.goes_on(pair)) {
+    found.verdict = ReferenceWatch::Verdict::kDoubted;
+  }
+  if (found.verdict == ReferenceWatch::Verdict::kDoubted) {
+    port_.count(Counter::kDoubtedTime);
+    return false;
+  }
+  if (found.verdict == ReferenceWatch::Verdict::kJumped) follow_jump(found.jump, now, actions);
+  return true;
+}
+
+void TimeReceiver::follow_jump(Duration jump, FreeRunningTime now, ActionList& actions) noexcept {
   port_.count(Counter::kReferenceJumps);
   // A request from before the jump would be answered after it: half the jump would look like delay.
   if (delay_requests_.running()) delay_requests_.restart(now, port_.counters());
@@ -259,8 +278,9 @@ void TimeReceiver::check_for_jump(const EventPair& forward, FreeRunningTime now,
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
   delay_requests_.stop(port_.counters());
-  last_forward_ = LastPair{};
+  reference_.reset();
   has_information_ = false;
+  new_time_base_told_ = 0;
   peer_delay_.set_reference_rate(Rate{});
   peer_delay_.set_transmitter(std::nullopt);
   sync_interval_.reset();

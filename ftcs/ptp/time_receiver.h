@@ -12,6 +12,7 @@
 #include "ftcs/ptp/fast_start.h"
 #include "ftcs/ptp/peer_delay.h"
 #include "ftcs/ptp/port.h"
+#include "ftcs/ptp/reference_watch.h"
 #include "ftcs/ptp/sync_matcher.h"
 
 namespace ftcs::ptp {
@@ -47,10 +48,6 @@ struct TimeReceiverConfig {
 
 /// A correctionField beyond this is refused: no network holds a message for a second.
 inline constexpr Nanoseconds kMaximumCorrection{1'000'000'000};
-/// ReferenceJumped from this difference on, plus an eighth of the time between the Syncs: far above
-/// the noise of any clock that can be followed, and half of the smallest jump that operators make
-/// (a leap second).
-inline constexpr Nanoseconds kJumpTolerance{500'000'000};
 
 /// An IEEE 1588-2019 ordinary clock that only receives time: end-to-end (11.3) or peer-to-peer
 /// (11.4) delay, best transmitter (9.3).
@@ -90,6 +87,9 @@ class TimeReceiver {
   [[nodiscard]] ActionList on_servo_locked(FreeRunningTime now) noexcept;
   /// SLAVE to UNCALIBRATED.
   [[nodiscard]] ActionList on_servo_unlocked(FreeRunningTime now) noexcept;
+  /// The selected transmitter tells a time that nobody wants to follow: any other is preferred for
+  /// ForeignTransmitters::kDoubtTime, and while there is none it stays selected.
+  [[nodiscard]] ActionList on_transmitter_doubted(FreeRunningTime now) noexcept;
 
   /// When on_timer() must be called, if no other input comes first. May lie in the past: then at
   /// once.
@@ -116,10 +116,6 @@ class TimeReceiver {
     std::optional<FreeRunningTime> received;
     FreeRunningTime now{};
   };
-  struct LastPair {
-    bool known = false;
-    EventPair pair{};
-  };
 
   void dispatch(const Message& message, const Input& input, ActionList& actions) noexcept;
   [[nodiscard]] bool usable_source(const Header& header) noexcept;
@@ -134,7 +130,7 @@ class TimeReceiver {
                     ActionList& actions) noexcept;
   void on_delay_resp(const Header& header, const DelayResp& response, FreeRunningTime now,
                      ActionList& actions) noexcept;
-  void follow_information(const FollowUp& follow_up, ActionList& actions) noexcept;
+  [[nodiscard]] bool believes_information(const FollowUp& follow_up, ActionList& actions) noexcept;
   bool decide(FreeRunningTime now, ActionList& actions) noexcept;
   void select(const TransmitterData& data, FreeRunningTime now, ActionList& actions) noexcept;
   void deliver(const EventPair& pair, ActionList& actions) noexcept;
@@ -142,7 +138,9 @@ class TimeReceiver {
   [[nodiscard]] std::optional<FreeRunningTime> sync_timeout() const noexcept;
   void send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept;
   void emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
-  void check_for_jump(const EventPair& forward, FreeRunningTime now, ActionList& actions) noexcept;
+  [[nodiscard]] bool believes(const EventPair& pair, FreeRunningTime now,
+                              ActionList& actions) noexcept;
+  void follow_jump(Duration jump, FreeRunningTime now, ActionList& actions) noexcept;
   void forget_exchanges() noexcept;
   [[nodiscard]] bool peer_to_peer() const noexcept {
     return config_.delay_mechanism == DelayMechanism::kPeerToPeer;
@@ -159,10 +157,12 @@ class TimeReceiver {
   std::optional<Duration> sync_interval_;
   SyncMatcher matcher_;
   DelayRequests delay_requests_;
-  LastPair last_forward_;
+  ReferenceWatch reference_;
   FreeRunningTime last_sync_{};  ///< of the followed transmitter, or when it was selected
   bool has_information_ = false;
   FollowUpInformation information_{};
+  std::uint16_t new_time_base_ = 0;  ///< another indicator than the believed one, told so often
+  int new_time_base_told_ = 0;
   bool servo_locked_ = false;
 };
 

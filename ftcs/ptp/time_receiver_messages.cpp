@@ -169,23 +169,34 @@ void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
   if (!usable_correction(header)) return;
   port_.count(Counter::kFollowUpReceived);
   const auto pair = matcher_.on_follow_up(header, follow_up, now, port_.counters());
-  if (pair && config_.major_sdo_id == kGptpSdoId) follow_information(follow_up, actions);
+  const bool informed = pair && config_.major_sdo_id == kGptpSdoId;
+  if (informed && !believes_information(follow_up, actions)) return;
   emit(pair, now, actions);
 }
 
 /// 802.1AS-2020, 11.4.4.3: how fast the grandmaster is, by the sender's clock, by which the peer
-/// delay was measured; and that its time base changed, however small the jump.
-void TimeReceiver::follow_information(const FollowUp& follow_up, ActionList& actions) noexcept {
-  if (!follow_up.has_information) return;
-  const bool changed = has_information_ && information_.gm_time_base_indicator !=
-                                               follow_up.information.gm_time_base_indicator;
+/// delay was measured; and that its time base changed, however small the jump. That is believed
+/// once ReferenceWatch::kAgreeing Follow_Ups in a row have said it; until then they tell no time.
+bool TimeReceiver::believes_information(const FollowUp& follow_up, ActionList& actions) noexcept {
+  if (!follow_up.has_information) return true;
+  const std::uint16_t indicator = follow_up.information.gm_time_base_indicator;
+  const bool changed = has_information_ && information_.gm_time_base_indicator != indicator;
+  const bool again = changed && new_time_base_told_ > 0 && new_time_base_ == indicator;
+  new_time_base_ = indicator;
+  new_time_base_told_ = changed ? (again ? new_time_base_told_ + 1 : 1) : 0;
+  if (changed && new_time_base_told_ < ReferenceWatch::kAgreeing) {
+    port_.count(Counter::kDoubtedTime);
+    return false;
+  }
+  new_time_base_told_ = 0;
   has_information_ = true;
   information_ = follow_up.information;
   peer_delay_.set_reference_rate(Rate::from_ratio(1.0 + information_.cumulative_rate_offset()));
-  if (!changed || !has_transmitter_) return;
+  if (!changed || !has_transmitter_) return true;
   port_.count(Counter::kReferenceJumps);
-  last_forward_ = LastPair{};  // the jump is known: it need not be found again
+  reference_.reset();  // the jump is known: it need not be found again
   port_.push(ReferenceJumped{information_.last_gm_phase_change}, actions);
+  return true;
 }
 
 void TimeReceiver::on_delay_resp(const Header& header, const DelayResp& response,

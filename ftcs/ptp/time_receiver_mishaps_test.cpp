@@ -429,23 +429,63 @@ TEST_F(Receiver, a_jump_of_the_reference_is_reported_and_open_requests_are_forgo
   static_cast<void>(general(follow_up(0, 1s), 1s));
   static_cast<void>(
       receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)));
-  static_cast<void>(event(sync_from(kA, 1), 1125ms));
-  const auto actions = general(follow_up(1, 2125ms), 1125ms);
+  for (std::uint16_t i = 1; i < 3; ++i) {
+    static_cast<void>(event(sync_from(kA, i), 1s + i * 125ms));
+    EXPECT_TRUE(of<EmitPair>(general(follow_up(i, 2s + i * 125ms), 1s + i * 125ms)).empty());
+  }
+  EXPECT_EQ(count(Counter::kDoubtedTime), 2U);
+  static_cast<void>(event(sync_from(kA, 3), 1375ms));
+  const auto actions = general(follow_up(3, 2375ms), 1375ms);
   ASSERT_EQ(of<ReferenceJumped>(actions).size(), 1U);
   EXPECT_EQ(of<ReferenceJumped>(actions)[0].jump, Duration{1s});
   ASSERT_EQ(of<EmitPair>(actions).size(), 1U) << "the pair tells the truth: the servo decides";
   EXPECT_TRUE(std::holds_alternative<ReferenceJumped>(actions[0])) << "the news comes first";
   EXPECT_EQ(count(Counter::kReferenceJumps), 1U);
-  EXPECT_TRUE(of<EmitPair>(general(delay_resp(id, 2126ms), 1126ms)).empty());
+  EXPECT_TRUE(of<EmitPair>(general(delay_resp(id, 2376ms), 1376ms)).empty());
   EXPECT_EQ(count(Counter::kStaleDelayResp), 1U);
-  EXPECT_EQ(of<SendMessage>(receiver_.on_timer(local(1126ms))).size(), 1U) << "asked again at once";
+  EXPECT_EQ(of<SendMessage>(receiver_.on_timer(local(1376ms))).size(), 1U) << "asked again at once";
 
-  static_cast<void>(event(sync_from(kA, 2), 1250ms));
-  EXPECT_TRUE(of<ReferenceJumped>(general(follow_up(2, 2250ms), 1250ms)).empty()) << "told once";
-  static_cast<void>(event(sync_from(kA, 3), 1375ms));
-  const auto back = of<ReferenceJumped>(general(follow_up(3, 1375ms), 1375ms));
-  ASSERT_EQ(back.size(), 1U);
-  EXPECT_EQ(back[0].jump, Duration{-1s});
+  static_cast<void>(event(sync_from(kA, 4), 1500ms));
+  EXPECT_TRUE(of<ReferenceJumped>(general(follow_up(4, 2500ms), 1500ms)).empty()) << "told once";
+  for (std::uint16_t i = 5; i < 8; ++i) {
+    static_cast<void>(event(sync_from(kA, i), 1s + i * 125ms));
+    const auto back = of<ReferenceJumped>(general(follow_up(i, 1s + i * 125ms), 1s + i * 125ms));
+    ASSERT_EQ(back.size(), i < 7 ? 0U : 1U);
+    for (const ReferenceJumped& one : back) EXPECT_EQ(one.jump, Duration{-1s});
+  }
+}
+
+// One pair an hour ahead, four times a second between eight true ones, ran the clock at its limit.
+TEST_F(Receiver, syncs_that_contradict_the_others_one_by_one_or_in_a_burst_are_never_followed) {
+  select_a();
+  std::uint16_t id = 0;
+  std::size_t emitted = 0;
+  const auto hear = [&](Nanoseconds at, Nanoseconds told) {
+    const auto actions = event(message_from(kA, id++, Sync{reference(told)}), at);
+    EXPECT_TRUE(of<ReferenceJumped>(actions).empty());
+    emitted += of<EmitPair>(actions).size();
+  };
+  for (int i = 0; i < 200; ++i) {
+    const Nanoseconds at = 1s + i * 125ms;
+    hear(at, at);
+    if (i % 2 == 0) hear(at + 30ms, at + 1h);
+    if (i % 20 == 10) {
+      for (int n = 0; n < 4; ++n) hear(at + 40ms + n * 1ms, at + 2h);
+    }
+  }
+  EXPECT_EQ(emitted, 200U);
+  EXPECT_EQ(count(Counter::kReferenceJumps), 0U);
+  EXPECT_EQ(count(Counter::kDoubtedTime), 100U + 40U);
+}
+
+TEST_F(Receiver, an_answer_an_hour_off_is_no_delay) {
+  select_a();
+  const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;
+  static_cast<void>(general(follow_up(0, 1s), 1s));
+  static_cast<void>(
+      receiver_.on_transmit_timestamp({MessageType::kDelayReq, id}, local(1s), local(1s)));
+  EXPECT_TRUE(of<EmitPair>(general(delay_resp(id, 1s + 1h), 1s + 1ms)).empty());
+  EXPECT_EQ(count(Counter::kDoubtedTime), 1U);
 }
 
 TEST_F(Receiver, a_transmitter_started_again_with_the_same_ids_makes_no_wrong_pair) {

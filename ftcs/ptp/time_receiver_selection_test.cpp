@@ -202,5 +202,24 @@ TEST_F(Receiver, identities_that_no_clock_has_are_not_followed) {
   EXPECT_EQ(count(Counter::kUnusableAnnounce), 9U);
 }
 
+// The better one told a time that was refused: any other is preferred, and while there is none, it
+// stays.
+TEST_F(Receiver, a_doubted_transmitter_makes_room_for_any_other_and_is_forgiven_in_time) {
+  select_a();
+  EXPECT_EQ(of<TransmitterDoubted>(receiver_.on_transmitter_doubted(local(1s))).size(), 1U);
+  EXPECT_EQ(receiver_.transmitter()->port, kA) << "there is no other";
+  static_cast<void>(general(announce_from(kB, 200), 1s));
+  static_cast<void>(general(announce_from(kB, 200), 2s));
+  EXPECT_EQ(receiver_.transmitter()->port, kB) << "worse, and not doubted";
+  for (Nanoseconds at = 3s; at < 300s; at += 1s) {
+    static_cast<void>(general(announce_from(kA), at));
+    static_cast<void>(general(announce_from(kB, 200), at));
+    ASSERT_EQ(receiver_.transmitter()->port, kB);
+  }
+  static_cast<void>(general(announce_from(kA), 302s));
+  EXPECT_EQ(receiver_.transmitter()->port, kA);
+  EXPECT_EQ(count(Counter::kDoubtedTransmitters), 1U);
+}
+
 }  // namespace
 }  // namespace ftcs::ptp::receiver_test

@@ -218,9 +218,9 @@ TEST_F(UnicastReceiver, asks_its_peer_and_adds_the_asymmetry_to_both_directions)
   static_cast<void>(receiver_.on_transmit_timestamp(
       {MessageType::kDelayReq, requests[0].sequence_id}, local(3s), local(3s)));
   const auto backward =
-      of<EmitPair>(general(in_domain(delay_resp(requests[0].sequence_id, 4s)), 4s));
+      of<EmitPair>(general(in_domain(delay_resp(requests[0].sequence_id, 3s + 400ms)), 4s));
   ASSERT_EQ(backward.size(), 1U);
-  EXPECT_EQ(backward[0].pair.reference, reference(4s) + Duration{500ns});
+  EXPECT_EQ(backward[0].pair.reference, reference(3s + 400ms) + Duration{500ns});
 }
 
 // The link.

@@ -71,7 +71,8 @@ Result<std::unique_ptr<PhcRunner>, std::string> PhcRunner::open(platform::Kernel
   if (!comparison) return comparison.error();
   const std::string name = device->name();
   utc->reference_is_utc = source->is_system();
-  platform::KernelClock clock(std::move(*device), options.servo.limits, !options.free_running);
+  const RateLimits limits = steering_limits(*device, options.servo.limits);
+  platform::KernelClock clock(std::move(*device), limits, !options.free_running);
   if (const auto error = clock.failure()) return describe(name, *error);
   auto sink = std::make_unique<RealClock>(kernel, log, std::move(clock), std::move(*utc));
   // Not make_unique: the constructor is private.

@@ -93,6 +93,7 @@ TEST(PhcRunner, keeps_a_constant_difference) {
 
 TEST(PhcRunner, never_steps_if_told_so_and_is_there_within_two_readings) {
   World world;
+  world.options.servo.limits = RateLimits::symmetric_ppb(100e6);
   world.options.first_step_threshold = Nanoseconds{0};
   double last = world.kernel.system.time_ns;
   world.kernel.on_clock_read = [&] {
@@ -102,9 +103,23 @@ TEST(PhcRunner, never_steps_if_told_so_and_is_there_within_two_readings) {
   EXPECT_LT(world.largest_difference(20.0, 3.0), 200.0);
 }
 
+// CLOCK_MONOTONIC goes with it, and programs take its rate for true.
+TEST(PhcRunner, the_system_clock_runs_no_more_than_500_ppm_off_unless_asked_to) {
+  World world;
+  world.options.first_step_threshold = Nanoseconds{0};
+  double largest_rate = 0.0;
+  world.kernel.on_poll = [&] {
+    largest_rate = std::max(largest_rate, std::abs(world.kernel.system.steering() - 1.0));
+  };
+  EXPECT_EQ(world.run(4.0), kNotLocked) << "a millisecond takes two seconds, a band of more";
+  EXPECT_GT(largest_rate, 400e-6);
+  EXPECT_LE(largest_rate, 500.1e-6);
+}
+
 TEST(PhcRunner, steps_at_any_time_above_a_threshold_if_it_is_given_one) {
   for (const bool may_step : {false, true}) {
     World world;
+    world.options.servo.limits = RateLimits::symmetric_ppb(100e6);
     if (may_step) world.options.step_threshold = Nanoseconds{1'000'000};
     bool jumped = false;
     double farthest_late = 0.0;  // ten readings after the source jumped by 50 ms
