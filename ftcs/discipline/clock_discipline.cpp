@@ -70,9 +70,9 @@ Telemetry ClockDiscipline::on_pair(const EventPair& event, bool paces) noexcept 
   } else {
     count(event.direction, update.verdict);
   }
-  if (used && paces && event.direction == Direction::kForward) {
-    note_sample(event);
-    if (telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
+  if (paces && event.direction == Direction::kForward) {
+    if (used || lock_survives(pair)) note_sample(event);
+    if (used && telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
   }
   check_silence(now);
   if (update.has_command) steer(update.command, telemetry_.servo.offset);
@@ -172,6 +172,16 @@ void ClockDiscipline::count(Direction direction, SampleVerdict verdict) noexcept
       ++counters_.implausible;
       break;
   }
+}
+
+// It may be an outlier or the truth: either way the transmitter is alive, and the clock no further
+// off than a lock allows. Only a servo that knows its deviation can say so.
+bool ClockDiscipline::lock_survives(const TimestampPair& refused) const noexcept {
+  const ServoSnapshot& servo = telemetry_.servo;
+  if (telemetry_.verdict != SampleVerdict::kRejected || !servo.offset_known) return false;
+  const Duration said = offset_from_reference(refused.local, refused.reference + servo.path_delay);
+  return std::abs(said.ns()) < config_.lock.band.leave.ns() &&
+         servo.offset_sigma_ns < config_.lock.band.enter.ns();
 }
 
 void ClockDiscipline::note_sample(const EventPair& pair) noexcept {

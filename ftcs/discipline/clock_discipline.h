@@ -25,7 +25,9 @@ struct DisciplineConfig {
   /// The rate of the clock changes by no more at a time, dimensionless. Zero: any. The adaptive
   /// servo plans with it, any other is cut.
   double largest_rate_change = 0.0;
-  /// Sync intervals without a usable sample before holdover: more than one or two lost messages.
+  /// Sync intervals without a usable sample before holdover: more than one or two lost messages. A
+  /// sample that the servo refused is usable for that while the clock is within what a lock means,
+  /// by the servo's deviation and by the sample's own word.
   std::uint32_t missed_intervals_to_holdover = 4;
 };
 
@@ -78,6 +80,7 @@ class ClockDiscipline {
  private:
   void begin(const ClockReading& reading) noexcept;
   void count(Direction direction, SampleVerdict verdict) noexcept;
+  [[nodiscard]] bool lock_survives(const TimestampPair& refused) const noexcept;
   void note_sample(const EventPair& pair) noexcept;
   void check_silence(const ClockReading& reading) noexcept;
   void steer(const ServoCommand& wanted, Duration offset) noexcept;

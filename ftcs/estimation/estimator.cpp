@@ -109,6 +109,8 @@ void Estimator<Grid>::begin(std::size_t side) noexcept {
   if (const KnownDelay known = known_delay(); known.known()) {
     start.d = known.mean_ns;
     start.dd = known.sigma_ns * known.sigma_ns / (scale_ * scale_);
+  } else {
+    pinned_ = true;
   }
   bank_.start(start);
   seen_[side] = true;
@@ -122,12 +124,12 @@ template <class Grid>
 void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
-  const bool free_already = bank_.estimate(best_).dd > 0.0;  // free_delay()
-  if (!known_delay().known() && !free_already) unpin_delay(-sign_of(side), kDelayPrior);
+  if (pinned_) unpin_delay(-sign_of(side), kDelayPrior);
 }
 
 template <class Grid>
 void Estimator<Grid>::unpin_delay(double first_sign, double variance) noexcept {
+  pinned_ = false;
   bank_.for_each([=](Estimate& e) {
     e.xx += variance;
     e.xd -= first_sign * variance;

@@ -113,6 +113,17 @@ TEST(Estimator, a_second_direction_separates_offset_and_delay) {
   EXPECT_NEAR(estimator.estimate().d, 700.0, 20.0);
 }
 
+TEST(Estimator, the_first_message_of_the_second_direction_sets_the_delay_free_however_late) {
+  for (const int before : {2, 5, 20}) {
+    Estimator<FullGrid> estimator;
+    estimator.expect_noise_of_at_least(0.4);
+    for (int n = 0; n < before; ++n) (void)estimator.update({1.0, 1.0, 5000.0 + 90.0});
+    (void)estimator.update({-1.0, 0.5, 5000.0 - 90.0});
+    EXPECT_NEAR(estimator.estimate().x, 5000.0, 0.1) << before << " of the first direction";
+    EXPECT_NEAR(estimator.estimate().d, 90.0, 0.1);
+  }
+}
+
 TEST(Estimator, the_gain_falls_by_itself) {
   Estimator<FullGrid> estimator{KnownDelay{0.0, 0.0}};
   std::mt19937_64 random(1);

@@ -26,6 +26,9 @@ constexpr double kNoiseMemory = 1000.0;
 constexpr double kShareFrom = 20.0;
 constexpr double kLeastShare = 0.002;
 constexpr double kMostShare = 0.995;
+/// Share at the floor above which what is late is an outlier rather than one
+/// that waited, as others do.
+constexpr double kWaitsAreUsual = 0.85;
 /// A square counts at most so many variances.
 constexpr double kSquareLimit = 60.0;
 /// Three sigma early, squared, and for how many messages it is remembered: late
@@ -85,13 +88,14 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
   }
   const Bank::Innovations in = judge(seen, path);
   const double credit = in.credit[best_];
+  const bool late = in.centred[best_] > 0.0;
   said_ = in.log_density[best_];
   testimony_ = {
       quick_exp(std::max(log_normal(in.distance[best_], in.log_variance[best_]), kLeastLogDensity)),
-      0.0, path.share, path.recent_share};
-  testimony_.waiting = in.centred[best_] > 0.0
-                           ? path.waits.at(in.centred[best_])
-                           : (1.0 - credit) * quick_exp(std::max(said_, kLeastLogDensity));
+      0.0, path.share, path.recent_share,
+      late && std::min(path.share, path.recent_share) < kWaitsAreUsual};
+  testimony_.waiting = late ? path.waits.at(in.centred[best_])
+                            : (1.0 - credit) * quick_exp(std::max(said_, kLeastLogDensity));
   const double s2 = scale_ * scale_;
   gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];
   watch_jumps(seen, path, in);

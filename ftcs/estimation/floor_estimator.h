@@ -33,6 +33,7 @@ class FloorEstimator {
     double waiting = 0.0;   ///< of one that waits
     double share = 0.5;     ///< of messages at the floor in its direction, by a long memory
     double recent_share = 0.5;
+    bool waited = false;  ///< late, where waiting is usual
   };
 
   void restart() noexcept;

@@ -113,7 +113,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
   believed_ = floor_.locked() && lead >= kDisbelieved && convinces;
-  return believed_ ? own : credit;
+  if (!believed_) return credit;
+  return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
 }
 
 template <class Grid>
