@@ -140,7 +140,7 @@ class Estimator {
   std::uint32_t since_change_ = 0;
   bool diverged_ = false;
   bool delay_freed_ = false;
-  bool pinned_ = false;  ///< one direction alone has been heard, and its delay is not known
+  bool pinned_ = false;        ///< one direction alone has been heard, and its delay is not known
   std::uint8_t surprise_ = 0;  ///< messages for which the second opinion is still sought
   float said_ = 0.0F;          ///< ln density of the last message
   double scale_ = 100.0;
