@@ -7,7 +7,6 @@
 
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/monitor_receiver.h"
-#include "ftcs/daemon/ptp_clock.h"
 #include "ftcs/daemon/ptp_receiver.h"
 #include "ftcs/daemon/ptp_transmitter.h"
 #include "ftcs/platform/network_interface.h"
@@ -39,6 +38,11 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
       transport_(kernel, options.socket, *timestamps_, *this) {}
 
 int PtpPort::run() {
+  const platform::StopFlag stop;
+  return run([&stop] { return stop.is_set(); });
+}
+
+int PtpPort::run(const std::function<bool()>& stop) {
   for (const std::string& note : options_.notes) log_(LogLevel::kNotice, "{}", note);
   if (const auto error = open_source()) {
     log_(LogLevel::kError, "{}", error->message());
@@ -47,12 +51,11 @@ int PtpPort::run() {
   if (!open_management() || !open_feed()) return kRuntimeError;
   report_stamps();
   if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
-  const platform::StopFlag stop;
   start(now());
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
-  while (!stop.is_set() && !failure_ && !(end && now() >= *end)) turn(end);
-  service_.stopping();
+  while (!stop() && !failure_ && !(end && now() >= *end)) turn(end);
+  service_->stopping();
   if (real_clock_ != nullptr) {
     real_clock_->stop();
     if (!failure_) failure_ = real_clock_->refusal();
@@ -257,6 +260,18 @@ Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& ker
   return ptp::PortIdentity{ptp::ClockIdentity::from_mac(*address), 1};
 }
 
+Result<PortFacts, platform::OsError> port_facts(platform::Kernel& kernel, const PtpOptions& options,
+                                                const PtpClocks& clocks) {
+  const auto identity = port_identity(kernel, options);
+  if (!identity) return identity.error();
+  PortFacts facts{*identity};
+  facts.hardware_stamps = clocks.timestamps->is_hardware();
+  if (const auto address = platform::identity_address(kernel, options.interface)) {
+    facts.address = *address;
+  }
+  return facts;
+}
+
 int run_ptp(platform::Kernel& kernel, const PtpOptions& given) {
   PtpOptions options = given;
   Log log(kernel, options.output == Output::kText ? stdout : stderr, options.log_level);
@@ -266,16 +281,12 @@ int run_ptp(platform::Kernel& kernel, const PtpOptions& given) {
     log(LogLevel::kError, "{}", clocks.error());
     return kRuntimeError;
   }
-  const auto identity = port_identity(kernel, options);
-  if (!identity) {
-    log(LogLevel::kError, "{}", identity.error().message());
+  const auto found = port_facts(kernel, options, *clocks);
+  if (!found) {
+    log(LogLevel::kError, "{}", found.error().message());
     return kRuntimeError;
   }
-  PortFacts facts{*identity};
-  facts.hardware_stamps = clocks->timestamps->is_hardware();
-  if (const auto address = platform::identity_address(kernel, options.interface)) {
-    facts.address = *address;
-  }
+  const PortFacts& facts = *found;
   RealClock* const real = clocks->real.get();
   if (options.source == Source::kPtp4l) {
     return MonitorReceiver(kernel, options, log, std::move(clocks->timestamps), facts, real).run();

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ftcs/clock/skewed_source.h"
@@ -15,6 +17,7 @@
 #include "ftcs/daemon/log.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/port_data_sets.h"
+#include "ftcs/daemon/ptp_clock.h"
 #include "ftcs/daemon/ptp_options.h"
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/service_report.h"
@@ -41,6 +44,11 @@ class PtpPort : private platform::TransportHandler {
 
   /// Until SIGINT, SIGTERM, the configured duration or an error; returns an exit code.
   [[nodiscard]] int run();
+  /// The same in a thread of a program that has its own signals: until `stop`, asked four times a
+  /// second.
+  [[nodiscard]] int run(const std::function<bool()>& stop);
+  /// The service manager hears of somebody else whether this program is ready.
+  void silence_service() { service_.emplace(platform::ServiceManager("")); }
 
  protected:
   // What comes in. Event stamps and `now` are on the free-running oscillator.
@@ -89,7 +97,8 @@ class PtpPort : private platform::TransportHandler {
   }
   /// Who says what may steer a real clock; null: the clock is virtual.
   [[nodiscard]] node::ReferenceGate* gate() { return real_clock_; }
-  [[nodiscard]] ServiceReport& service() { return service_; }
+  [[nodiscard]] ServiceReport& service() { return *service_; }
+  [[nodiscard]] platform::Kernel& kernel() { return kernel_; }
   /// Null: the clock is virtual.
   [[nodiscard]] RealClock* real_clock() { return real_clock_; }
   [[nodiscard]] const PtpOptions& options() const { return options_; }
@@ -128,7 +137,7 @@ class PtpPort : private platform::TransportHandler {
   bool stamp_missed_ = false;
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take
-  ServiceReport service_{};
+  std::optional<ServiceReport> service_{std::in_place};
   std::optional<std::string> failure_{};
 };
 
@@ -136,6 +145,11 @@ class PtpPort : private platform::TransportHandler {
 /// the process.
 [[nodiscard]] Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& kernel,
                                                                          const PtpOptions& options);
+
+/// Identity, address and kind of stamps of the port that the options ask for.
+[[nodiscard]] Result<PortFacts, platform::OsError> port_facts(platform::Kernel& kernel,
+                                                              const PtpOptions& options,
+                                                              const PtpClocks& clocks);
 
 /// Opens clock and sockets and runs the role that the options ask for. Returns an exit code.
 [[nodiscard]] int run_ptp(platform::Kernel& kernel, const PtpOptions& options);

@@ -18,11 +18,17 @@ namespace ftcs::daemon {
 
 /// A clock, virtual or real, that follows a PTP time transmitter: a node::ReceiverNode between
 /// sockets and log.
-class PtpReceiver final : public PtpPort, private Managed {
+class PtpReceiver : public PtpPort, private Managed {
  public:
   PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Log& log,
               std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
               RealClock* real_clock);
+
+ protected:
+  void housekeeping(FreeRunningTime now) override;
+  [[nodiscard]] const node::ReceiverNode& node() const { return node_; }
+  /// What the port does, or what it waits for.
+  [[nodiscard]] std::string service_sentence() const;
 
  private:
   void start(FreeRunningTime now) override;
@@ -36,7 +42,6 @@ class PtpReceiver final : public PtpPort, private Managed {
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const override {
     return node_.deadline();
   }
-  void housekeeping(FreeRunningTime now) override;
   [[nodiscard]] int finish() override;
   [[nodiscard]] Managed* managed() override { return this; }
   [[nodiscard]] ptp::ManagedPort managed_port() override;
@@ -46,7 +51,6 @@ class PtpReceiver final : public PtpPort, private Managed {
   void take(const node::ReceiverEvent& event, FreeRunningTime now);
   void tell(const ptp::Action& action);
   void on_selected(const ptp::TransmitterSelected& selected);
-  [[nodiscard]] std::string service_sentence() const;
   void follow_scale_change();
   /// True if there was something to say.
   bool log_missing(LogLevel level);

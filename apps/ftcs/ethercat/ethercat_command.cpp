@@ -6,11 +6,13 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/config_file.h"
 #include "apps/ftcs/ethercat/run_html.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/daemon/ethercat/cycle_laws.h"
 #include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/daemon/ethercat/ptp_plant_source.h"
 #include "ftcs/daemon/ethercat/run_report.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/report/write_file.h"
@@ -35,11 +37,13 @@ struct EthercatArguments {
   std::string lock_policy = "recovering";
   std::string bus_mode = "follow";
   std::string bus_write = "offset";
+  std::string ptp_config;
   std::vector<double> gains;
   bool slew = false;
 };
 
 using Wrong = std::optional<std::string>;
+constexpr std::string_view kPtp = "ptp";
 
 Wrong read(const char* flag, const std::string& text, std::int64_t lowest, Nanoseconds& target) {
   const auto value = parse_duration(text);
@@ -163,6 +167,30 @@ int end_with(const ethercat::Failure& failure, const daemon::RunOptions& options
   return end_with(fmt::format("{} {}", daemon::describe(failure), where), kRuntimeError);
 }
 
+/// "ptp:eth1", or "ptp" where a configuration file has the interface.
+Result<daemon::PlantClock, std::string> open_ptp(const EthercatArguments& arguments,
+                                                 platform::Kernel& kernel) {
+  daemon::PtpOptions options;
+  if (!arguments.ptp_config.empty()) {
+    if (auto wrong = read_config_file(arguments.ptp_config, options)) return std::move(*wrong);
+  }
+  const std::string& name = arguments.options.plant_time;
+  if (name.size() > kPtp.size()) options.interface = name.substr(kPtp.size() + 1);
+  if (options.interface.empty()) {
+    return std::string("on which interface? As in ptp:eth1, or by --ptp-config");
+  }
+  auto source = daemon::PtpPlantSource::start(kernel, options);
+  if (!source) return std::move(source.error());
+  return daemon::PlantClock(kernel, name, std::move(*source));
+}
+
+Result<daemon::PlantClock, std::string> open_plant(const EthercatArguments& arguments,
+                                                   platform::Kernel& kernel) {
+  const std::string& name = arguments.options.plant_time;
+  const bool ptp = name == kPtp || name.starts_with(std::string(kPtp) + ":");
+  return ptp ? open_ptp(arguments, kernel) : daemon::PlantClock::open(name, kernel);
+}
+
 using Body = int (*)(daemon::MainRunner& runner, const std::function<bool()>& stop);
 
 /// What scan and run begin with: flags checked, link open.
@@ -181,7 +209,7 @@ int with_runner(EthercatArguments arguments, Body body) {
   const platform::StopFlag stop_flag;
   const auto runner = std::make_unique<daemon::MainRunner>(arguments.options, std::move(*link));
   if (!arguments.options.plant_time.empty()) {
-    auto plant = daemon::PlantClock::open(arguments.options.plant_time, kernel);
+    auto plant = open_plant(arguments, kernel);
     if (!plant) return end_with("--plant-time: " + plant.error(), kRuntimeError);
     runner->set_plant_clock(std::move(*plant));
   }
@@ -222,6 +250,7 @@ int run_main(daemon::MainRunner& runner, const std::function<bool()>& stop) {
   const daemon::RunOptions& options = runner.options();
   if (!can_write_results({options.json, options.html})) return kRuntimeError;
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
+  if (const auto unknown = runner.await_plant_time(stop)) return end_with(*unknown, kNotLocked);
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
@@ -324,7 +353,10 @@ void add_bus_flags(CLI::App& command, EthercatArguments& arguments) {
                   "follows the drives, and they plant time; DCX)")
       ->check(CLI::IsMember({"follow", "lead", "external"}));
   command.add_option("--plant-time", options.plant_time,
-                     "tai (CLOCK_TAI), realtime, or a PTP hardware clock such as /dev/ptp0");
+                     "ptp:INTERFACE (a PTP receiver of this process), tai (CLOCK_TAI), realtime, "
+                     "aux0 to aux7 (CLOCK_AUX), or a PTP hardware clock such as /dev/ptp0");
+  command.add_option("--ptp-config", arguments.ptp_config,
+                     "of --plant-time ptp: a configuration file as ptp4l's");
   command
       .add_option("--bus-write", arguments.bus_write,
                   "how the drives' clock is moved: offset (default: increments of 0x0920), or as "

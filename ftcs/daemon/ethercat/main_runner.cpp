@@ -89,6 +89,23 @@ void MainRunner::exchange() {
   if (!transfer(frame, HostClock::now() + Duration{kReplyTimeout})) node_->on_timeout();
 }
 
+std::optional<std::string> MainRunner::await_plant_time(const std::function<bool()>& stop) {
+  constexpr double kPatience_s = 30.0;
+  constexpr Nanoseconds kLook{10'000'000};
+  const double patience_s = options_.await_lock_s > 0.0 ? options_.await_lock_s : kPatience_s;
+  const FreeRunningTime start = HostClock::now();
+  while (plant_ && !plant_->at(HostClock::now())) {
+    if (stop()) return "stopped by a signal before plant time was known";
+    if ((HostClock::now() - start).seconds() > patience_s) {
+      const std::string reason = plant_->reason();
+      return fmt::format("--plant-time {}: not known after {:g} s{}{}", plant_->name(), patience_s,
+                         reason.empty() ? "" : ": ", reason);
+    }
+    HostClock::wait_until(HostClock::now() + Duration{kLook}, Nanoseconds{0});
+  }
+  return std::nullopt;
+}
+
 bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
   if (scan_only) node_ = std::make_unique<node::CycleNode>(node_config(options_, true));
   auto stage = ethercat::Stage::kStopped;

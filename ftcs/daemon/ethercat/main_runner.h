@@ -76,6 +76,9 @@ class MainRunner {
   }
   /// The clock of --plant-time; before bring_up().
   void set_plant_clock(PlantClock clock) { plant_.emplace(std::move(clock)); }
+  /// The drives are put onto plant time before the first cycle: waits until it is known. One
+  /// sentence if it is not within --await-lock (zero: half a minute), or `stop` came first.
+  [[nodiscard]] std::optional<std::string> await_plant_time(const std::function<bool()>& stop);
   [[nodiscard]] const BusClockDecision& bus() const { return node_->bus(); }
   [[nodiscard]] std::optional<WriteError> finish_csv() { return csv_.finish(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ethercat/plant_line.h"
+
+#include "ftcs/time/rate.h"
+
+namespace ftcs::daemon {
+
+namespace {
+constexpr Duration kLargestGap{Nanoseconds{1'000'000'000}};
+constexpr Duration kJump{Nanoseconds{10'000}};
+}  // namespace
+
+void PlantLine::add(const PlantReading& reading) noexcept {
+  if (count_ > 0) {
+    const bool late = reading.instant - newest().instant > kLargestGap;
+    // The first line has no slope of its own yet: an oscillator 100 ppm off is 12 us further on.
+    const bool jumped = count_ > 1 && abs(reading.plant - extended_to(reading.instant)) > kJump;
+    if (late || jumped || reading.instant <= newest().instant) count_ = 0;
+  }
+  kept_[count_ % kKept] = reading;
+  ++count_;
+}
+
+ReferenceTime PlantLine::extended_to(FreeRunningTime instant) const noexcept {
+  const PlantReading& first = kept_[count_ > kKept ? count_ % kKept : 0];
+  const Duration beyond = instant - newest().instant;
+  if (count_ < 2) return newest().plant + beyond;
+  const double slope =
+      (newest().plant - first.plant).ns() / (newest().instant - first.instant).ns();
+  return newest().plant + scale(beyond, Rate::from_ratio(slope));
+}
+
+std::optional<ReferenceTime> PlantLine::at(FreeRunningTime instant) const noexcept {
+  if (count_ == 0 || instant - newest().instant > kLargestGap) return std::nullopt;
+  return extended_to(instant);
+}
+
+}  // namespace ftcs::daemon
