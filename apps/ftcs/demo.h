@@ -14,6 +14,10 @@
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/report/table.h"
 
+namespace ftcs::daemon {
+struct EthercatDemo;
+}
+
 namespace ftcs::app {
 
 struct DemoOptions {
@@ -80,8 +84,6 @@ class DemoReceiver final : public daemon::PtpCorePort<ptp::TimeReceiver> {
   bool interrupted_ = false;
 };
 
-struct EthercatDemo;
-
 /// Runs both parts; prints tables and sentences. Returns an exit code: both locked or not.
 [[nodiscard]] int run_demo(const DemoOptions& options, const DemoFiles& files);
 
@@ -91,8 +93,8 @@ struct EthercatDemo;
 [[nodiscard]] std::string demo_method(const DemoOptions& options, const DemoResult& result);
 /// Field names: docs/demo.md. A part that did not run is left out.
 [[nodiscard]] std::string demo_json(const DemoOptions& options, const DemoResult* result,
-                                    const EthercatDemo* ethercat);
+                                    const daemon::EthercatDemo* ethercat);
 [[nodiscard]] std::string demo_html(const DemoOptions& options, const DemoResult* result,
-                                    const EthercatDemo* ethercat);
+                                    const daemon::EthercatDemo* ethercat);
 
 }  // namespace ftcs::app

@@ -8,10 +8,10 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/demo.h"
-#include "apps/ftcs/demo_ethercat.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/daemon/ethercat/ethercat_demo.h"
 #include "ftcs/daemon/ptp_transmitter.h"
 
 namespace ftcs::app {
@@ -161,7 +161,7 @@ int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
 }
 
 int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResult* result,
-                const EthercatDemo* ethercat) {
+                const daemon::EthercatDemo* ethercat) {
   bool written = files.json.empty() || write_result(files.json, demo_json(demo, result, ethercat));
   written &= files.html.empty() || write_result(files.html, demo_html(demo, result, ethercat));
   if (!files.html.empty() && written) fmt::print("\nreport: {}\n", files.html);
@@ -176,13 +176,13 @@ int run_demo(const DemoOptions& demo, const DemoFiles& files) {
   if (demo.ptp) {
     if (const int code = run_ptp_demo(demo, result); code != kSuccess) return code;
   }
-  std::unique_ptr<EthercatDemo> ethercat;
+  std::unique_ptr<daemon::EthercatDemo> ethercat;
   if (demo.ethercat && !result.interrupted) {
     // Four runs, which with the PTP half take less than three times its time.
     constexpr double kPartOfDuration = 0.3;
-    ethercat = run_ethercat_demo({demo.duration_s * kPartOfDuration, demo.live_view});
+    ethercat = daemon::run_ethercat_demo({demo.duration_s * kPartOfDuration, demo.live_view});
     if (ethercat == nullptr) return kRuntimeError;
-    fmt::print("{}", ethercat_demo_text(*ethercat));
+    fmt::print("{}", daemon::ethercat_demo_text(*ethercat));
   }
   const int code = write_files(demo, files, demo.ptp ? &result : nullptr, ethercat.get());
   if (code != kSuccess) return code;

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/demo.h"
-#include "apps/ftcs/demo_ethercat.h"
-#include "apps/ftcs/ethercat/run_html.h"
+#include "ftcs/daemon/ethercat/ethercat_demo.h"
+#include "ftcs/daemon/ethercat/run_html.h"
 #include "ftcs/report/html_report.h"
 
 namespace ftcs::app {
@@ -33,7 +33,7 @@ std::string lock_text(const DemoResult& result) {
 }  // namespace
 
 std::string demo_html(const DemoOptions& options, const DemoResult* result,
-                      const EthercatDemo* ethercat) {
+                      const daemon::EthercatDemo* ethercat) {
   HtmlReport report("Frequency-tracking clock servo: demonstration",
                     "A clock locked over PTP, and the cycle of eight EtherCAT drives");
   std::vector<LabelledText> figures;
@@ -57,9 +57,9 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
     report.add_plot(offset_plot_of(*result));
   }
   if (ethercat != nullptr) {
-    add_run_sections(report, ethercat->views());
+    daemon::add_run_sections(report, ethercat->views());
     report.add_table("EtherCAT: what the drives saw in the last run",
-                     drives_table(ethercat->segment->server()));
+                     daemon::drives_table(ethercat->segment->server()));
   }
   report.add_parameters({{"version", FTCS_VERSION},
                          {"duration of the PTP part", fmt::format("{:g} s", options.duration_s)},

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/demo.h"
-#include "apps/ftcs/demo_ethercat.h"
+#include "ftcs/daemon/ethercat/ethercat_demo.h"
 #include "ftcs/report/json.h"
 #include "ftcs/report/table.h"
 
@@ -75,11 +75,11 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
 }  // namespace
 
 std::string demo_json(const DemoOptions& options, const DemoResult* result,
-                      const EthercatDemo* ethercat) {
+                      const daemon::EthercatDemo* ethercat) {
   Json root;
   root["duration_s"] = options.duration_s;
   if (result != nullptr) add_ptp(root, options, *result);
-  if (ethercat != nullptr) root["ethercat"] = ethercat_demo_json(*ethercat);
+  if (ethercat != nullptr) root["ethercat"] = daemon::ethercat_demo_json(*ethercat);
   return dump(root);
 }
 

@@ -63,14 +63,6 @@ std::string offset_plot(std::span<const double> offsets_ns, std::size_t width) {
   return plot;
 }
 
-std::string format_time(double ns) {
-  const double magnitude = std::abs(ns);
-  if (!(magnitude < 1e9)) return fmt::format("{:.3f} s", ns * 1e-9);
-  if (magnitude >= 1e6) return fmt::format("{:.3f} ms", ns * 1e-6);
-  if (magnitude >= 1e3) return fmt::format("{:.3f} us", ns * 1e-3);
-  return fmt::format("{:.0f} ns", ns);
-}
-
 void LiveView::draw(std::span<const experiment::ServoTrial* const> trials, double elapsed_seconds,
                     double total_seconds) {
   if (!enabled_) return;

@@ -6,15 +6,13 @@
 #include <string>
 
 #include "ftcs/experiment/servo_trial.h"
+#include "ftcs/report/table.h"
 
 namespace ftcs::app {
 
 /// |offset| on a logarithmic scale, one character each, the newest on the right: 10 ns is the
 /// lowest, 1 ms the highest of eight heights.
 [[nodiscard]] std::string offset_plot(std::span<const double> offsets_ns, std::size_t width);
-
-/// A time for people: four significant digits and a unit that fits, "-1.234 us".
-[[nodiscard]] std::string format_time(double ns);
 
 /// A few lines on a terminal that are drawn over again and again; silent where the output is not a
 /// terminal.

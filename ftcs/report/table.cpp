@@ -138,4 +138,12 @@ std::string csv_number(double value) {
   return fmt::format("{}", value);
 }
 
+std::string format_time(double ns) {
+  const double magnitude = std::abs(ns);
+  if (!(magnitude < 1e9)) return fmt::format("{:.3f} s", ns * 1e-9);
+  if (magnitude >= 1e6) return fmt::format("{:.3f} ms", ns * 1e-6);
+  if (magnitude >= 1e3) return fmt::format("{:.3f} us", ns * 1e-3);
+  return fmt::format("{:.0f} ns", ns);
+}
+
 }  // namespace ftcs

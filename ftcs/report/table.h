@@ -50,4 +50,7 @@ class Table {
 /// Shortest form that reads back; empty if not finite.
 [[nodiscard]] std::string csv_number(double value);
 
+/// A time for people: four significant digits and a unit that fits, "-1.234 us".
+[[nodiscard]] std::string format_time(double ns);
+
 }  // namespace ftcs

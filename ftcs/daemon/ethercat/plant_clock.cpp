@@ -136,7 +136,7 @@ Opened PlantClock::open(const std::string& source, platform::Kernel& kernel) {
   if (source.starts_with("aux")) return open_auxiliary(kernel, source);
   if (!source.starts_with("/dev/")) {
     return fmt::format(
-        "'{}' is neither tai, realtime, auxN, ptp:INTERFACE, bridge nor a device such as /dev/ptp0",
+        "'{}' is neither tai, realtime, auxN, ptp:INTERFACE nor a device such as /dev/ptp0",
         source);
   }
   auto device = platform::ClockDevice::open_phc(kernel, source, platform::ClockAccess::kRead);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/daemon/ethercat/ptp_plant_source.h"
 
+#include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "ftcs/daemon/ptp_clock.h"
@@ -94,6 +96,20 @@ PtpPlantSource::~PtpPlantSource() {
 std::string PtpPlantSource::reason() {
   if (ended_) return "the PTP receiver has ended: its last line says why";
   return receiver_->reason();
+}
+
+Result<PlantClock, std::string> open_plant_clock(const std::string& name, PtpOptions ptp,
+                                                 platform::Kernel& kernel) {
+  constexpr std::string_view kWithInterface = "ptp:";
+  const bool named = name.starts_with(kWithInterface);
+  if (!named && name != "ptp") return PlantClock::open(name, kernel);
+  if (named) ptp.interface = name.substr(kWithInterface.size());
+  if (ptp.interface.empty()) {
+    return std::string("on which interface? As in ptp:eth1, or by --ptp-config");
+  }
+  auto source = PtpPlantSource::start(kernel, ptp);
+  if (!source) return std::move(source.error());
+  return PlantClock(kernel, name, std::move(*source));
 }
 
 }  // namespace ftcs::daemon

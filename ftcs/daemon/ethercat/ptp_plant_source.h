@@ -65,4 +65,10 @@ class PtpPlantSource final : public PlantSource {
   std::thread thread_;
 };
 
+/// The clock of --plant-time: "ptp:eth1" ("ptp" where the options have the interface), or what
+/// PlantClock::open() knows.
+[[nodiscard]] Result<PlantClock, std::string> open_plant_clock(const std::string& name,
+                                                               PtpOptions ptp,
+                                                               platform::Kernel& kernel);
+
 }  // namespace ftcs::daemon

@@ -8,7 +8,7 @@
 #include "ftcs/daemon/ethercat/main_runner.h"
 #include "ftcs/report/json.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 struct EthercatDemoOptions {
   double seconds_per_servo = 6.0;
@@ -18,11 +18,11 @@ struct EthercatDemoOptions {
 /// The second half of the demonstration: eight drives and a MainDevice on loopback, one run for
 /// each way to keep the cycle in phase with their clock.
 struct EthercatDemo {
-  std::unique_ptr<daemon::LocalSegment> segment;
-  std::vector<std::unique_ptr<daemon::MainRunner>> runs;  ///< FTCS first
+  std::unique_ptr<LocalSegment> segment;
+  std::vector<std::unique_ptr<MainRunner>> runs;  ///< FTCS first
   platform::RealtimeSetup setup;
 
-  [[nodiscard]] std::vector<const daemon::MainRunner*> views() const;
+  [[nodiscard]] std::vector<const MainRunner*> views() const;
 };
 
 /// Says on standard error what went wrong, and returns nothing then.
@@ -30,4 +30,4 @@ struct EthercatDemo {
 [[nodiscard]] std::string ethercat_demo_text(const EthercatDemo& demo);
 [[nodiscard]] Json ethercat_demo_json(const EthercatDemo& demo);
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

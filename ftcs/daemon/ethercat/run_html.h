@@ -8,13 +8,13 @@
 #include "ftcs/report/html_report.h"
 #include "ftcs/report/table.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 /// One row for each run: lock, phase, frame, working counter.
-[[nodiscard]] Table runs_table(std::span<const daemon::MainRunner* const> runs);
+[[nodiscard]] Table runs_table(std::span<const MainRunner* const> runs);
 /// Phase over time, histograms of margin, lateness and phase of the first run, one table.
-void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* const> runs);
+void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> runs);
 /// What the drives saw, as the segment knows it.
-[[nodiscard]] Table drives_table(const daemon::SegmentServer& server);
+[[nodiscard]] Table drives_table(const SegmentServer& server);
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

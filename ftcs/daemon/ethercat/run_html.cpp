@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include "apps/ftcs/ethercat/run_html.h"
+#include "ftcs/daemon/ethercat/run_html.h"
 
 #include <cstdlib>
 
 #include <fmt/format.h>
 
-#include "apps/ftcs/live_view.h"
 #include "ftcs/daemon/ethercat/run_histograms.h"
 #include "ftcs/daemon/ethercat/run_report.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 namespace {
 
-PlotSeries over_time(const daemon::MainRunner& run, float experiment::CyclePoint::*field) {
+PlotSeries over_time(const MainRunner& run, float experiment::CyclePoint::*field) {
   PlotSeries series;
   series.name = run.options().servo_name;
   for (const experiment::CyclePoint& point : run.figures().trace) {
@@ -23,24 +22,24 @@ PlotSeries over_time(const daemon::MainRunner& run, float experiment::CyclePoint
   return series;
 }
 
-Plot time_plot(std::span<const daemon::MainRunner* const> runs, const char* title,
-               const char* label, float experiment::CyclePoint::*field) {
+Plot time_plot(std::span<const MainRunner* const> runs, const char* title, const char* label,
+               float experiment::CyclePoint::*field) {
   Plot plot;
   plot.title = title;
   plot.x_label = "s";
   plot.y_label = label;
-  for (const daemon::MainRunner* run : runs) plot.series.push_back(over_time(*run, field));
+  for (const MainRunner* run : runs) plot.series.push_back(over_time(*run, field));
   return plot;
 }
 
-Plot histogram_plot(const daemon::MainRunner& run, const char* title,
+Plot histogram_plot(const MainRunner& run, const char* title,
                     float experiment::CyclePoint::*field) {
   Plot plot;
   plot.title = fmt::format("{}, {}", title, run.options().servo_name);
   plot.x_label = "us";
   plot.y_label = "cycles";
   plot.style = PlotStyle::kFilledSteps;
-  const Histogram bins = daemon::run_histogram(run.figures(), field);
+  const Histogram bins = run_histogram(run.figures(), field);
   if (bins.counts.empty()) return plot;
   plot.series.push_back(histogram_series("cycles", bins, 1.0));
   plot.note = fmt::format("{} cycles lie outside.", bins.below + bins.above);
@@ -48,15 +47,15 @@ Plot histogram_plot(const daemon::MainRunner& run, const char* title,
 }
 
 /// What happened on the way, of all runs: locks, drives that left OP and came back.
-Table events_table(std::span<const daemon::MainRunner* const> runs) {
+Table events_table(std::span<const MainRunner* const> runs) {
   Table table({"servo", "s", "drive", "what", "AL status code"});
-  for (const daemon::MainRunner* run : runs) {
+  for (const MainRunner* run : runs) {
     for (const experiment::CycleEvent& event : run->figures().events) {
       const bool coded = event.note.code != ethercat::AlStatusCode::kNoError;
       table.add_row(
           {run->options().servo_name, Cell::fixed(event.time_s, 3),
            event.note.drive == node::CycleNote::kNobody ? Cell{"-"} : Cell::count(event.note.drive),
-           daemon::name(event.note.kind),
+           name(event.note.kind),
            coded ? fmt::format("0x{:04X} {}", static_cast<unsigned>(event.note.code),
                                ethercat::name(event.note.code))
                  : "-"});
@@ -65,9 +64,9 @@ Table events_table(std::span<const daemon::MainRunner* const> runs) {
   return table;
 }
 
-std::string relock_text(std::span<const daemon::MainRunner* const> runs) {
+std::string relock_text(std::span<const MainRunner* const> runs) {
   std::string text;
-  for (const daemon::MainRunner* run : runs) {
+  for (const MainRunner* run : runs) {
     const experiment::CycleFigures& figures = run->figures();
     text += fmt::format("{}: lock lost {} times, longest way back {} cycles. ",
                         run->options().servo_name, figures.lock.losses(),
@@ -84,11 +83,11 @@ std::string pair_of(const QuantileSketch& sketch) {
 
 }  // namespace
 
-Table runs_table(std::span<const daemon::MainRunner* const> runs) {
+Table runs_table(std::span<const MainRunner* const> runs) {
   Table table({"servo", "locked", "cycles to lock", "sync intervals", "virtual phase p50 / p99",
                "frame itself p50 / p99", "working counter right", "lost", "stalls", "excluded",
                "|0x092C|"});
-  for (const daemon::MainRunner* run : runs) {
+  for (const MainRunner* run : runs) {
     const experiment::CycleFigures& figures = run->figures();
     const bool locked = figures.lock_cycle >= 0;
     const double intervals = static_cast<double>(figures.lock_cycle) /
@@ -112,7 +111,7 @@ Table runs_table(std::span<const daemon::MainRunner* const> runs) {
   return table;
 }
 
-void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* const> runs) {
+void add_run_sections(HtmlReport& report, std::span<const MainRunner* const> runs) {
   report.add_table(
       "EtherCAT: the cycle and its reference", runs_table(runs),
       "Virtual phase: the cycle as scheduled against SYNC0's grid, the sender's lateness (which it "
@@ -124,7 +123,7 @@ void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* co
                             &experiment::CyclePoint::phase_us));
   if (runs.empty()) return;
   report.add_table("EtherCAT: what happened", events_table(runs), relock_text(runs));
-  const daemon::MainRunner& first = *runs.front();
+  const MainRunner& first = *runs.front();
   report.add_plot(
       histogram_plot(first, "Margin from the frame to SYNC0", &experiment::CyclePoint::margin_us));
   report.add_plot(
@@ -135,7 +134,7 @@ void add_run_sections(HtmlReport& report, std::span<const daemon::MainRunner* co
       histogram_plot(first, "Round trip of the frame", &experiment::CyclePoint::round_trip_us));
 }
 
-Table drives_table(const daemon::SegmentServer& server) {
+Table drives_table(const SegmentServer& server) {
   Table table({"drive", "state", "AL status", "|0x092C| / ns", "SYNC0 events", "missed",
                "smallest margin / us", "largest margin / us"});
   const ethercat::Segment& segment = server.segment();
@@ -156,4 +155,4 @@ Table drives_table(const daemon::SegmentServer& server) {
   return table;
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

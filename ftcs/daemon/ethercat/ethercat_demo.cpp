@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "apps/ftcs/demo_ethercat.h"
+#include "ftcs/daemon/ethercat/ethercat_demo.h"
 
 #include <fmt/format.h>
 
-#include "apps/ftcs/ethercat/run_html.h"
 #include "ftcs/daemon/ethercat/cycle_laws.h"
+#include "ftcs/daemon/ethercat/run_html.h"
 #include "ftcs/daemon/ethercat/run_report.h"
 #include "ftcs/platform/stop_flag.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 namespace {
 
@@ -25,8 +25,8 @@ constexpr std::uint32_t kLostFrames = 250;
 /// Some hundreds let the clocks converge; the rest happens while the cycle runs.
 constexpr std::uint32_t kDriftPulses = 3000;
 
-daemon::RunOptions run_options(const EthercatDemoOptions& demo, std::uint16_t port) {
-  daemon::RunOptions options;
+RunOptions run_options(const EthercatDemoOptions& demo, std::uint16_t port) {
+  RunOptions options;
   options.port = port;
   options.drives = kDrives;
   options.servo.cycle = kCycle;
@@ -42,17 +42,17 @@ daemon::RunOptions run_options(const EthercatDemoOptions& demo, std::uint16_t po
 
 }  // namespace
 
-std::vector<const daemon::MainRunner*> EthercatDemo::views() const {
-  std::vector<const daemon::MainRunner*> result;
+std::vector<const MainRunner*> EthercatDemo::views() const {
+  std::vector<const MainRunner*> result;
   for (const auto& run : runs) result.push_back(run.get());
   return result;
 }
 
 std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& options) {
   auto demo = std::make_unique<EthercatDemo>();
-  daemon::SegmentOptions segment;
+  SegmentOptions segment;
   segment.drives = kDrives;
-  auto started = daemon::LocalSegment::start(segment, kSegmentPriority);
+  auto started = LocalSegment::start(segment, kSegmentPriority);
   if (!started) {
     fmt::print(stderr, "ftcs demo: {}\n", started.error().message());
     return nullptr;
@@ -62,8 +62,8 @@ std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& optio
   const auto stop = [&stop_flag] { return stop_flag.is_set(); };
   for (const char* servo : {"ftcs", "adaptive", "pics", "soem-pi"}) {
     if (stop()) break;
-    daemon::RunOptions run = run_options(options, demo->segment->port());
-    daemon::set_cycle_law(run, servo);
+    RunOptions run = run_options(options, demo->segment->port());
+    set_cycle_law(run, servo);
     auto link = platform::EthercatLink::connect_udp(run.host, run.port);
     if (!link) {
       fmt::print(stderr, "ftcs demo: {}\n", link.error().message());
@@ -71,10 +71,10 @@ std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& optio
     }
     if (demo->runs.empty()) demo->setup = platform::make_realtime(run.priority, run.cpu);
     if (!run.quiet) fmt::print("\nEtherCAT, eight drives, servo {}\n", servo);
-    auto runner = std::make_unique<daemon::MainRunner>(run, std::move(*link));
+    auto runner = std::make_unique<MainRunner>(run, std::move(*link));
     if (!runner->bring_up(stop, false)) {
       if (stop()) break;
-      fmt::print(stderr, "ftcs demo: EtherCAT: {}\n", daemon::describe(runner->main().failure()));
+      fmt::print(stderr, "ftcs demo: EtherCAT: {}\n", describe(runner->main().failure()));
       return nullptr;
     }
     runner->run(stop);
@@ -106,8 +106,8 @@ std::string ethercat_demo_text(const EthercatDemo& demo) {
 
 Json ethercat_demo_json(const EthercatDemo& demo) {
   Json rows = Json::array();
-  for (const auto& run : demo.runs) rows.push_back(daemon::run_json(*run));
+  for (const auto& run : demo.runs) rows.push_back(run_json(*run));
   return rows;
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/daemon/ethercat/ethercat_run.h"
+
+#include <cerrno>
+#include <functional>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/daemon/ethercat/ptp_plant_source.h"
+#include "ftcs/daemon/ethercat/run_html.h"
+#include "ftcs/daemon/ethercat/run_report.h"
+#include "ftcs/daemon/exit_code.h"
+#include "ftcs/platform/stop_flag.h"
+#include "ftcs/report/write_file.h"
+
+namespace ftcs::daemon {
+
+namespace {
+
+Result<platform::EthercatLink, platform::OsError> open_link(const RunOptions& options) {
+  return options.interface.empty() ? platform::EthercatLink::connect_udp(options.host, options.port)
+                                   : platform::EthercatLink::open_raw(options.interface);
+}
+
+/// One MainDevice a wire: what is held against a second one on this host.
+std::string wire_of(const RunOptions& options) {
+  return options.interface.empty() ? fmt::format("udp {}:{}", options.host, options.port)
+                                   : options.interface;
+}
+
+int end_with(const std::string& message, int exit_code) {
+  fmt::print(stderr, "ftcs ethercat: {}\n", message);
+  return exit_code;
+}
+
+int end_with(const ethercat::Failure& failure, const RunOptions& options) {
+  if (!failure)
+    return end_with(
+        "stopped by a signal before the first cycle; the SubDevices stay in the state they had "
+        "reached",
+        kNotLocked);
+  if (failure.kind != ethercat::FailureKind::kNoReply) {
+    return end_with(describe(failure), kRuntimeError);
+  }
+  const std::string where =
+      options.interface.empty()
+          ? fmt::format("from {}:{}: does ftcs ethercat-segment run there?", options.host,
+                        options.port)
+          : fmt::format("on interface {}: is a SubDevice with power connected to it?",
+                        options.interface);
+  return end_with(fmt::format("{} {}", describe(failure), where), kRuntimeError);
+}
+
+using Body = int (*)(MainRunner& runner, const std::function<bool()>& stop);
+
+/// What scan and run begin with: the wire held, the link open.
+int with_runner(platform::Kernel& kernel, const RunOptions& options, Body body) {
+  const std::string wire = wire_of(options);
+  const int held = kernel.hold_name(("ftcs ethercat " + wire).c_str());
+  if (held == -EADDRINUSE) {
+    return end_with(fmt::format("another ftcs ethercat uses {} already: stop it first", wire),
+                    kRuntimeError);
+  }
+  const platform::Descriptor hold(kernel, held);
+  auto link = open_link(options);
+  if (!link) return end_with(link.error().message(), kRuntimeError);
+  const platform::StopFlag stop_flag;
+  const auto runner = std::make_unique<MainRunner>(options, std::move(*link));
+  if (!options.plant_time.empty()) {
+    auto plant = open_plant_clock(options.plant_time, options.ptp, kernel);
+    if (!plant) return end_with("--plant-time: " + plant.error(), kRuntimeError);
+    runner->set_plant_clock(std::move(*plant));
+  }
+  return body(*runner, [&stop_flag] { return stop_flag.is_set(); });
+}
+
+int run_scan(MainRunner& runner, const std::function<bool()>& stop) {
+  if (!runner.bring_up(stop, true)) return end_with(runner.main().failure(), runner.options());
+  print_scan(runner.main());
+  return kSuccess;
+}
+
+void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options) {
+  const auto got = [](bool obtained) { return obtained ? "obtained" : "refused"; };
+  fmt::print("SCHED_FIFO {} {}, mlockall {}, pinned to a processor {}, no sleep states {}\n",
+             options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
+             got(setup.memory_locked), options.cpu >= 0 ? got(setup.pinned) : "not asked for",
+             got(setup.latency_held));
+  if (options.spin > Nanoseconds{0}) {
+    fmt::print("the last {} us before each cycle keep a processor busy\n",
+               options.spin.count() / 1000);
+  }
+}
+
+std::optional<WriteError> write_reports(const MainRunner& runner) {
+  const RunOptions& options = runner.options();
+  if (!options.json.empty()) {
+    if (auto error = write_file(options.json, dump(run_json(runner)))) return error;
+  }
+  if (options.html.empty()) return std::nullopt;
+  const MainRunner* const runs[] = {&runner};
+  HtmlReport report("EtherCAT: a cycle that follows the distributed clock", options.servo_name);
+  add_run_sections(report, runs);
+  return write_file(options.html, report.render());
+}
+
+int run_main(MainRunner& runner, const std::function<bool()>& stop) {
+  const RunOptions& options = runner.options();
+  if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
+  if (const auto unknown = runner.await_plant_time(stop)) return end_with(*unknown, kNotLocked);
+  const auto setup = platform::make_realtime(options.priority, options.cpu);
+  if (!options.quiet) print_setup(setup, options);
+  if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
+  if (options.bus_mode != node::BusMode::kFollow && !runner.main().network().has_reference()) {
+    return end_with("no drive with a distributed clock: there is nothing to put on plant time",
+                    kRuntimeError);
+  }
+  runner.run(stop);
+  if (!options.quiet) print_run(runner);
+  // The figures are written even if a record is cut short, and whatever ended the run.
+  const auto reports = write_reports(runner);
+  const auto csv = runner.finish_csv();
+  if (csv) end_with(csv->message + " (the run went on without it)", kRuntimeError);
+  if (reports) end_with(reports->message, kRuntimeError);
+  if (runner.main().failure()) return end_with(runner.main().failure(), options);
+  if (csv || reports) return kRuntimeError;
+  if (runner.decision().state != CycleState::kLocked) return kNotLocked;
+  if (runner.main().last_cycle().all_operational()) return kSuccess;
+  return end_with("not every drive was in OP at the end: the lines above and --json tell which",
+                  kNotLocked);
+}
+
+}  // namespace
+
+int scan_ethercat(platform::Kernel& kernel, const RunOptions& options) {
+  return with_runner(kernel, options, run_scan);
+}
+
+int run_ethercat(platform::Kernel& kernel, const RunOptions& options) {
+  return with_runner(kernel, options, run_main);
+}
+
+}  // namespace ftcs::daemon
