@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
@@ -19,7 +21,9 @@ struct AnalyseOptions {
   SeriesOptions series;
   std::string kind;
   double interval_s = 0.0;
-  double confidence = kOneSigmaConfidence;
+  AnalysisOptions analysis;
+  std::string taus = "octave";
+  std::vector<std::string> deviations;
   std::string json;
   std::string csv;
   std::string html;
@@ -31,7 +35,49 @@ RecordKind kind_named(const std::string& word) {
   return word == "offset" ? RecordKind::kOffset : RecordKind::kPhase;
 }
 
+/// "octave", "decade", "all", or averaging times in seconds: "1,10,100". Says what is wrong.
+std::string read_taus(const std::string& text, AnalysisOptions& analysis) {
+  if (text == "octave") analysis.factors = octave_factors;
+  if (text == "decade") analysis.factors = decade_factors;
+  if (text == "all") analysis.factors = all_factors;
+  if (text == "octave" || text == "decade" || text == "all") return "";
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    double tau_s = 0.0;
+    if (!CLI::detail::lexical_cast(word, tau_s) || !(tau_s > 0.0) || !std::isfinite(tau_s)) {
+      return fmt::format(
+          "--taus is octave, decade, all or times in seconds such as 1,10,100; got {}", text);
+    }
+    analysis.taus_s.push_back(tau_s);
+  }
+  return "";
+}
+
+std::string read_deviations(const std::vector<std::string>& words, AnalysisOptions& analysis) {
+  if (!words.empty()) analysis.deviations.clear();
+  for (const std::string& word : words) {
+    const auto deviation = deviation_named(word);
+    if (deviation) {
+      analysis.deviations.push_back(*deviation);
+    } else if (word == "all") {
+      const auto all = all_deviations();
+      analysis.deviations.assign(all.begin(), all.end());
+    } else {
+      std::string known;
+      for (const Deviation each : all_deviations()) known += fmt::format(", {}", name(each));
+      return fmt::format("--deviation is all or one of {} in small letters; got {}",
+                         known.substr(2), word);
+    }
+  }
+  return "";
+}
+
 int analyse(AnalyseOptions options) {
+  for (const std::string& wrong : {read_taus(options.taus, options.analysis),
+                                   read_deviations(options.deviations, options.analysis)}) {
+    if (wrong.empty()) continue;
+    fmt::print(stderr, "ftcs analyse: {}\n", wrong);
+    return kUsageError;
+  }
   if (!options.kind.empty()) options.series.kind = kind_named(options.kind);
   if (options.interval_s > 0.0) options.series.interval_s = options.interval_s;
   if (!can_write_results({options.json, options.csv, options.html})) return kRuntimeError;
@@ -40,8 +86,7 @@ int analyse(AnalyseOptions options) {
     fmt::print(stderr, "ftcs: {}\n", series.error().text());
     return kRuntimeError;
   }
-  const AnalysedRecord record =
-      analyse_series(options.file, std::move(*series), options.confidence);
+  const AnalysedRecord record = analyse_series(options.file, std::move(*series), options.analysis);
   if (!options.quiet) fmt::print("{}", console_report(record));
   // Each is tried even if one before failed: a full disk must not cost the others.
   bool written = write_result(options.json, options.json.empty() ? "" : dump(json_report(record)));
@@ -74,14 +119,30 @@ void add_analyse_command(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"phase", "frequency", "offset"}));
   command->add_option(
       "--unit", options->series.unit,
-      "s, ms, us, ns, ps; of frequency 1, ppm, ppb, ppt (default: by heading and kind)");
+      "s, ms, us, ns, ps; of frequency 1, ppm, ppb, ppt, or Hz, kHz, MHz, GHz with --nominal "
+      "(default: by heading and kind)");
+  command
+      ->add_option("--nominal", options->series.nominal_hz,
+                   "frequency in Hz that a record in Hz should have: 10e6")
+      ->check(CLI::PositiveNumber);
   command->add_option("--source", options->series.source,
                       "of a log of several programs or clocks: which, as in 'phc2sys eth1'");
   command
       ->add_option("--interval", options->interval_s,
                    "seconds between values (default: from the times, else 1)")
       ->check(CLI::PositiveNumber);
-  command->add_option("--confidence", options->confidence, "of the intervals (default: 0.683)")
+  command->add_option(
+      "--taus", options->taus,
+      "octave (1, 2, 4, ... intervals), decade (1, 2, 4, 10, ...), all, or seconds: 1,10,100");
+  command
+      ->add_option(
+          "--deviation", options->deviations,
+          "oadev, mdev, ohdev, tdev (these by default), adev, hdev, totdev, mtotdev, ttotdev, "
+          "htotdev, all; the first has the interval in the table")
+      ->delimiter(',');
+  command
+      ->add_option("--confidence", options->analysis.confidence,
+                   "of the intervals (default: 0.683)")
       ->check([](const std::string& text) -> std::string {
         double value = 0.0;
         const bool valid = CLI::detail::lexical_cast(text, value) && value > 0.0 && value < 1.0;

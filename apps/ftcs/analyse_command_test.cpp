@@ -76,6 +76,29 @@ TEST_F(AnalyseCommand, leaves_with_2_when_it_is_called_wrongly) {
   EXPECT_EQ(run({file("offsets.csv"), "--confidence", "1"}), kUsageError);
 }
 
+TEST_F(AnalyseCommand, computes_the_statistics_and_taus_that_it_is_asked_for) {
+  std::ofstream values(file("phase.txt"));
+  for (int i = 0; i < 200; ++i) values << (i * 7919 % 101) * 1e-9 << '\n';
+  values.close();
+  EXPECT_EQ(run({file("phase.txt"), "--deviation", "totdev,mtotdev", "--taus", "1,10,50", "--csv",
+                 file("c"), "-q"}),
+            kSuccess);
+  const std::string list = content(file("c"));
+  EXPECT_NE(list.find("\ntotdev,1,"), std::string::npos) << list;
+  EXPECT_NE(list.find("\ntotdev,10,"), std::string::npos);
+  EXPECT_NE(list.find("\nmtotdev,50,"), std::string::npos);
+  EXPECT_EQ(list.find("oadev"), std::string::npos);
+  EXPECT_EQ(list.find("totdev,2,"), std::string::npos);
+  EXPECT_EQ(run({file("phase.txt"), "--deviation", "all", "--taus", "decade"}), kSuccess);
+  for (const char* title : {"ADEV", "HTOTDEV", "TTOTDEV / s"})
+    EXPECT_NE(output_.find(title), std::string::npos) << title;
+  EXPECT_EQ(run({file("phase.txt"), "--deviation", "OADEV"}), kUsageError);
+  EXPECT_NE(errors_.find("one of"), std::string::npos);
+  EXPECT_EQ(run({file("phase.txt"), "--taus", "often"}), kUsageError);
+  EXPECT_NE(errors_.find("got often"), std::string::npos);
+  EXPECT_EQ(run({file("phase.txt"), "--taus", "-1"}), kUsageError);
+}
+
 TEST_F(AnalyseCommand, leaves_with_1_and_one_line_when_the_data_is_no_good) {
   std::ofstream(file("empty")) << "";
   std::ofstream(file("words")) << "1\n2\nthree\n";

@@ -180,6 +180,39 @@ double total_degrees_of_freedom(PowerLawNoise noise, std::size_t averaging_facto
   }
 }
 
+double modified_total_degrees_of_freedom(PowerLawNoise noise, std::size_t averaging_factor,
+                                         std::size_t points) noexcept {
+  if (averaging_factor == 0) return 0.0;
+  const double ratio = static_cast<double>(points) / static_cast<double>(averaging_factor);
+  switch (noise) {
+    case PowerLawNoise::kWhitePhase:
+      return 1.90 * ratio - 2.10;
+    case PowerLawNoise::kFlickerPhase:
+      return 1.20 * ratio - 1.40;
+    case PowerLawNoise::kWhiteFrequency:
+      return 1.10 * ratio - 1.20;
+    case PowerLawNoise::kFlickerFrequency:
+      return 0.85 * ratio - 0.50;
+    case PowerLawNoise::kRandomWalkFrequency:
+      return 0.75 * ratio - 0.31;
+  }
+  return 0.0;
+}
+
+double hadamard_total_degrees_of_freedom(PowerLawNoise noise, std::size_t averaging_factor,
+                                         std::size_t points) noexcept {
+  if (averaging_factor == 0) return 0.0;
+  const double ratio = static_cast<double>(points) / static_cast<double>(averaging_factor);
+  switch (noise) {
+    case PowerLawNoise::kFlickerFrequency:
+      return ratio / (0.868 + 1.140 / ratio);
+    case PowerLawNoise::kRandomWalkFrequency:
+      return ratio / (0.938 + 1.696 / ratio);
+    default:
+      return ratio / (0.559 + 1.004 / ratio);
+  }
+}
+
 ConfidenceInterval confidence_interval(double deviation, double degrees_of_freedom,
                                        double confidence) {
   if (!(degrees_of_freedom > 0.0) || !std::isfinite(deviation) || !(confidence > 0.0) ||

@@ -58,6 +58,17 @@ struct VarianceShape {
 [[nodiscard]] double total_degrees_of_freedom(PowerLawNoise noise, std::size_t averaging_factor,
                                               std::size_t points) noexcept;
 
+/// Of the modified total variance: b points/m - c (NIST SP 1065, 5.4).
+[[nodiscard]] double modified_total_degrees_of_freedom(PowerLawNoise noise,
+                                                       std::size_t averaging_factor,
+                                                       std::size_t points) noexcept;
+
+/// Of the Hadamard total variance: (points/m) / (b0 + b1 m/points) (NIST SP 1065, 5.4, for
+/// alpha 0, -1, -2; phase noise is given the white FM row, which is cautious).
+[[nodiscard]] double hadamard_total_degrees_of_freedom(PowerLawNoise noise,
+                                                       std::size_t averaging_factor,
+                                                       std::size_t points) noexcept;
+
 struct ConfidenceInterval {
   double lower;
   double upper;

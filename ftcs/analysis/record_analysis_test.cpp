@@ -42,9 +42,10 @@ TEST(AnalyseRecord, separates_frequency_offset_from_noise) {
   const RecordAnalysis analysis = analyse_record({phase, 1.0});
   EXPECT_NEAR(analysis.line.slope, 1e-6, 1e-12);
   EXPECT_NEAR(analysis.line.residual_rms, 10e-9, 0.5e-9);
-  EXPECT_NEAR(analysis.overlapping_allan[0].deviation, std::sqrt(3.0) * 10e-9, 1e-9);
-  EXPECT_EQ(analysis.overlapping_allan.size(), analysis.wander.size());
-  EXPECT_EQ(analysis.overlapping_allan[0].noise, PowerLawNoise::kWhitePhase);
+  EXPECT_NEAR(analysis.points(Deviation::kOverlappingAllan)[0].deviation, std::sqrt(3.0) * 10e-9,
+              1e-9);
+  EXPECT_EQ(analysis.points(Deviation::kOverlappingAllan).size(), analysis.wander.size());
+  EXPECT_EQ(analysis.points(Deviation::kOverlappingAllan)[0].noise, PowerLawNoise::kWhitePhase);
 }
 
 }  // namespace

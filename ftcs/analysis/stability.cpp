@@ -2,27 +2,37 @@
 #include "ftcs/analysis/stability.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <iterator>
 
 #include "ftcs/analysis/statistics.h"
+#include "ftcs/analysis/total_stretches.h"
 
 namespace ftcs {
 namespace {
 
+struct NamedDeviation {
+  Deviation deviation;
+  const char* name;
+};
+constexpr NamedDeviation kNames[] = {
+    {Deviation::kAllan, "ADEV"},         {Deviation::kOverlappingAllan, "OADEV"},
+    {Deviation::kModifiedAllan, "MDEV"}, {Deviation::kTime, "TDEV"},
+    {Deviation::kHadamard, "HDEV"},      {Deviation::kOverlappingHadamard, "OHDEV"},
+    {Deviation::kTotal, "TOTDEV"},       {Deviation::kModifiedTotal, "MTOTDEV"},
+    {Deviation::kTimeTotal, "TTOTDEV"},  {Deviation::kHadamardTotal, "HTOTDEV"},
+};
+
+/// Of stretches of 3m values? Not HTOT at m = 1: half-averages of three frequencies leave nothing.
+bool is_of_stretches(Deviation deviation, std::size_t m) {
+  return deviation == Deviation::kModifiedTotal || deviation == Deviation::kTimeTotal ||
+         (deviation == Deviation::kHadamardTotal && m > 1);
+}
+
 /// A window of MDEV with fewer of its second differences present is not used.
 constexpr double kSmallestShareOfWindow = 0.75;
-
-struct MeanSquare {
-  double sum = 0.0;
-  std::size_t terms = 0;
-
-  void add(double value) noexcept {
-    if (value != value) return;  // a gap
-    sum += value * value;
-    ++terms;
-  }
-  [[nodiscard]] double mean() const noexcept { return sum / static_cast<double>(terms); }
-};
 
 std::span<const double> without_outer_gaps(std::span<const double> phase) {
   while (!phase.empty() && !std::isfinite(phase.front())) phase = phase.subspan(1);
@@ -85,7 +95,18 @@ MeanSquare reflected_second_differences(std::span<const double> x, std::size_t m
   return square;
 }
 
+MeanSquare stretch_differences(Deviation deviation, std::span<const double> x, std::size_t m) {
+  if (deviation != Deviation::kHadamardTotal) return total_of_stretches(x, m);
+  // Frequencies times tau: their second difference of means is the third difference of phase.
+  std::vector<double> steps;
+  steps.reserve(x.size());
+  for (std::size_t i = 1; i < x.size(); ++i)
+    steps.push_back((x[i] - x[i - 1]) * static_cast<double>(m));
+  return total_of_stretches(steps, m);
+}
+
 MeanSquare mean_square(Deviation deviation, std::span<const double> x, std::size_t m) {
+  if (is_of_stretches(deviation, m)) return stretch_differences(deviation, x, m);
   switch (deviation) {
     case Deviation::kAllan:
       return second_differences(x, m, m);
@@ -97,9 +118,13 @@ MeanSquare mean_square(Deviation deviation, std::span<const double> x, std::size
     case Deviation::kHadamard:
       return third_differences(x, m, m);
     case Deviation::kOverlappingHadamard:
+    case Deviation::kHadamardTotal:
       return third_differences(x, m, 1);
     case Deviation::kTotal:
       return reflected_second_differences(x, m);
+    case Deviation::kModifiedTotal:
+    case Deviation::kTimeTotal:
+      break;  // of stretches
   }
   return {};
 }
@@ -109,19 +134,31 @@ double normalize(Deviation deviation, double square, double tau_s) {
   switch (deviation) {
     case Deviation::kHadamard:
     case Deviation::kOverlappingHadamard:
+    case Deviation::kHadamardTotal:
       return std::sqrt(square / 6.0) / tau_s;
     case Deviation::kTime:
+    case Deviation::kTimeTotal:
       return std::sqrt(square / 6.0);  // tau / sqrt(3) times sqrt(square / 2) / tau
     default:
       return std::sqrt(square / 2.0) / tau_s;
   }
 }
 
+/// Of the variance of a total deviation against the one that it stands for.
+double bias(Deviation deviation, PowerLawNoise noise, std::size_t m) {
+  constexpr double kModified[] = {0.69, 0.70, 0.73, 0.83, 0.94};  // alpha -2 to 2
+  constexpr double kHadamard[] = {0.771, 0.851, 0.995, 1.0, 1.0};
+  const auto row = static_cast<std::size_t>(static_cast<int>(noise) + 2);
+  if (!is_of_stretches(deviation, m)) return 1.0;
+  return deviation == Deviation::kHadamardTotal ? kHadamard[row] : kModified[row];
+}
+
 VarianceShape shape_of(Deviation deviation) {
   VarianceShape shape;
   shape.modified = deviation == Deviation::kModifiedAllan || deviation == Deviation::kTime;
   shape.overlapping = deviation != Deviation::kAllan && deviation != Deviation::kHadamard;
-  if (deviation == Deviation::kHadamard || deviation == Deviation::kOverlappingHadamard) {
+  if (deviation == Deviation::kHadamard || deviation == Deviation::kOverlappingHadamard ||
+      deviation == Deviation::kHadamardTotal) {
     shape.difference_order = 3;
   }
   return shape;
@@ -131,10 +168,40 @@ VarianceShape shape_of(Deviation deviation) {
 std::size_t possible_terms(Deviation deviation, std::size_t m, std::size_t points) {
   const VarianceShape shape = shape_of(deviation);
   if (deviation == Deviation::kTotal) return points > m + 1 ? points - 2 : 0;
+  if (is_of_stretches(deviation, m)) {
+    const std::size_t values = deviation == Deviation::kHadamardTotal ? points - 1 : points;
+    return values < 3 * m ? 0 : (values - 3 * m) / stretch_stride(values, m) + 1;
+  }
   const std::size_t span =
       static_cast<std::size_t>(shape.difference_order) * m + (shape.modified ? m : 1);
   if (points < span) return 0;
   return 1 + (points - span) / (shape.overlapping ? 1 : m);
+}
+
+double degrees_of_freedom(Deviation deviation, PowerLawNoise noise, std::size_t m,
+                          std::size_t points) {
+  if (deviation == Deviation::kTotal) return total_degrees_of_freedom(noise, m, points);
+  if (deviation == Deviation::kModifiedTotal || deviation == Deviation::kTimeTotal)
+    return modified_total_degrees_of_freedom(noise, m, points);
+  if (is_of_stretches(deviation, m)) return hadamard_total_degrees_of_freedom(noise, m, points);
+  return equivalent_degrees_of_freedom(noise, shape_of(deviation), m, points);
+}
+
+/// Where the noise cannot be told any more it may have become redder, by a power of f an octave as
+/// one law takes over from another: the fewest degrees of freedom of those that it may be.
+double cautious_degrees_of_freedom(Deviation deviation, PowerLawNoise noise, std::size_t m,
+                                   std::size_t points) {
+  const double beyond =
+      static_cast<double>(kFewestPointsForNoise * m) / static_cast<double>(points);
+  const int octaves = beyond > 1.0 ? static_cast<int>(std::ceil(std::log2(beyond))) : 0;
+  double fewest = degrees_of_freedom(deviation, noise, m, points);
+  const int reddest = std::max(static_cast<int>(noise) - octaves, -2);
+  for (int alpha = static_cast<int>(noise) - 1; alpha >= reddest; --alpha) {
+    const double redder =
+        degrees_of_freedom(deviation, static_cast<PowerLawNoise>(alpha), m, points);
+    fewest = std::min(fewest, redder);
+  }
+  return fewest;
 }
 
 std::vector<std::size_t> factors_of(std::size_t points, std::span<const std::size_t> mantissas,
@@ -151,23 +218,30 @@ std::vector<std::size_t> factors_of(std::size_t points, std::span<const std::siz
 }  // namespace
 
 const char* name(Deviation deviation) noexcept {
-  switch (deviation) {
-    case Deviation::kAllan:
-      return "ADEV";
-    case Deviation::kOverlappingAllan:
-      return "OADEV";
-    case Deviation::kModifiedAllan:
-      return "MDEV";
-    case Deviation::kTime:
-      return "TDEV";
-    case Deviation::kHadamard:
-      return "HDEV";
-    case Deviation::kOverlappingHadamard:
-      return "OHDEV";
-    case Deviation::kTotal:
-      return "TOTDEV";
+  for (const auto& [known, text] : kNames) {
+    if (known == deviation) return text;
   }
   return "unknown";
+}
+
+std::optional<Deviation> deviation_named(std::string_view name) noexcept {
+  const auto same = [](char small, char large) {
+    return small == static_cast<char>(std::tolower(static_cast<unsigned char>(large)));
+  };
+  for (const auto& [deviation, text] : kNames) {
+    const std::string_view known = text;
+    if (std::equal(name.begin(), name.end(), known.begin(), known.end(), same)) return deviation;
+  }
+  return std::nullopt;
+}
+
+std::span<const Deviation> all_deviations() noexcept {
+  static constexpr auto kAll = [] {
+    std::array<Deviation, std::size(kNames)> all{};
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = kNames[i].deviation;
+    return all;
+  }();
+  return kAll;
 }
 
 std::vector<StabilityPoint> stability(Deviation deviation, PhaseRecord record,
@@ -185,13 +259,10 @@ std::vector<StabilityPoint> stability(Deviation deviation, PhaseRecord record,
     StabilityPoint point;
     point.averaging_factor = m;
     point.tau_s = static_cast<double>(m) * record.interval_s;
-    point.deviation = normalize(deviation, square.mean(), point.tau_s);
+    point.deviation = normalize(deviation, square.mean() / bias(deviation, noise, m), point.tau_s);
     point.terms = square.terms;
     point.noise = noise;
-    const double whole =
-        deviation == Deviation::kTotal
-            ? total_degrees_of_freedom(noise, m, x.size())
-            : equivalent_degrees_of_freedom(noise, shape_of(deviation), m, x.size());
+    const double whole = cautious_degrees_of_freedom(deviation, noise, m, x.size());
     point.degrees_of_freedom =
         whole * static_cast<double>(square.terms) / static_cast<double>(possible);
     const ConfidenceInterval interval =
@@ -211,6 +282,20 @@ std::vector<std::size_t> octave_factors(std::size_t points) {
 std::vector<std::size_t> decade_factors(std::size_t points) {
   constexpr std::size_t kMantissas[] = {1, 2, 4};
   return factors_of(points, kMantissas, 10);
+}
+
+std::vector<std::size_t> all_factors(std::size_t points) {
+  constexpr double kMost = 1000.0;
+  std::vector<std::size_t> factors;
+  const std::size_t last = points > 2 ? (points - 1) / 2 : 0;
+  const double ratio = std::pow(static_cast<double>(last), 1.0 / kMost);
+  double next = 1.0;
+  for (std::size_t m = 1; m <= last; ++m) {
+    if (static_cast<double>(last) > kMost && static_cast<double>(m) < next) continue;
+    factors.push_back(m);
+    next = static_cast<double>(m) * ratio;
+  }
+  return factors;
 }
 
 std::vector<double> phase_from_frequency(std::span<const double> frequency, double interval_s) {

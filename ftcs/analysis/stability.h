@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "ftcs/analysis/power_law.h"
@@ -39,7 +41,25 @@ enum class Deviation : std::uint8_t {
   /// Eq. (25), p. 23. Not corrected for its bias at long tau (flicker FM: -0.24 tau/T of the
   /// variance).
   kTotal,
+  /// MTOT: MDEV of every stretch of 3m points, its half-average slope taken off and continued at
+  /// both
+  /// ends by its mirror image. SP 1065, 5.2. Up to m = N/3. Corrected for the bias that the noise
+  /// found at that tau gives it: the variance is 0.94 (white PM), 0.83 (flicker PM), 0.73 (white
+  /// FM),
+  /// 0.70 (flicker FM) or 0.69 (random walk FM) of MVAR (Howe & Vernotte 1999).
+  kModifiedTotal,
+  /// TTOT = tau MTOT / sqrt(3), in seconds.
+  kTimeTotal,
+  /// HTOT: the same as MTOT of stretches of 3m frequencies, with the factor of the Hadamard
+  /// deviation; at m = 1 OHDEV. Corrected likewise: 0.995 (white FM), 0.851 (flicker FM), 0.771
+  /// (random walk FM) of the Hadamard variance.
+  kHadamardTotal,
 };
+
+/// The estimator of a name in small letters, "oadev"; nothing if there is none.
+[[nodiscard]] std::optional<Deviation> deviation_named(std::string_view name) noexcept;
+/// All of them, in the order above.
+[[nodiscard]] std::span<const Deviation> all_deviations() noexcept;
 
 /// "ADEV", "OADEV", ...
 [[nodiscard]] const char* name(Deviation deviation) noexcept;
@@ -68,15 +88,28 @@ inline constexpr double kOneSigmaConfidence = 0.6826894921370859;
 /// not bias it, and white PM raises the result by at most 1/sqrt(0.75) - 1 = 15 %. The degrees of
 /// freedom are scaled by the share of terms that counted.
 ///
-/// O(N) for each factor (a tenth of a second for 10^7 points).
+/// O(N) for each factor (a tenth of a second for 10^7 points); MTOT, TTOT and HTOT O(N m) up to
+/// kMostExactTotal, beyond it every (m/16)-th stretch is taken, which are nearly all of the degrees
+/// of freedom: O(N) too.
+///
+/// The noise that decides an interval is identified at each tau as long as the record has
+/// kFewestPointsForNoise points of it. Beyond, the last answer is kept, and the fewest degrees of
+/// freedom of it and of noise redder by up to one power of f an octave are taken.
 [[nodiscard]] std::vector<StabilityPoint> stability(Deviation deviation, PhaseRecord record,
                                                     std::span<const std::size_t> averaging_factors,
                                                     double confidence = kOneSigmaConfidence);
+
+/// N m up to which the total deviations of stretches take every stretch.
+inline constexpr double kMostExactTotal = 4e6;
 
 /// 1, 2, 4, 8, ... as long as `points` phase points give a term of the Allan deviation.
 [[nodiscard]] std::vector<std::size_t> octave_factors(std::size_t points);
 /// 1, 2, 4, 10, 20, 40, 100, ... likewise.
 [[nodiscard]] std::vector<std::size_t> decade_factors(std::size_t points);
+
+/// Every factor from 1 to as many points as give a term; above 1,000 points at most 1,000 of them,
+/// equally spaced on a logarithmic scale.
+[[nodiscard]] std::vector<std::size_t> all_factors(std::size_t points);
 
 /// x_1 = 0, x_(i+1) = x_i + y_i tau_0 (SP 1065, 3.1): one point more than `frequency`. The mean is
 /// kept. A missing y leaves every later phase unknown: it is replaced by the mean of the others,

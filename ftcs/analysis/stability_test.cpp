@@ -2,6 +2,8 @@
 // World: the generated data set of NIST SP 1065, 12.4, and power-law noise of known level.
 #include "ftcs/analysis/stability.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -31,6 +33,7 @@ struct PublishedRow {
 // NIST SP 1065 (2008), Table 31, p. 108: the 1000-point test suite. TOTDEV by double reflection.
 // HDEV (not overlapping) also in W. J. Riley, "The Calculation of Time Domain Frequency Stability",
 // Table III, which prints 3.910860e-02 at 100: in exact rational arithmetic it is 3.9108606e-02.
+// HTOTDEV at 10 is printed there as 9.614787e-02: exactly it is 9.61478750e-02.
 constexpr PublishedRow kPublished[] = {
     {Deviation::kAllan, "2.922319e-01", "9.965736e-02", "3.897804e-02"},
     {Deviation::kOverlappingAllan, "2.922319e-01", "9.159953e-02", "3.241343e-02"},
@@ -39,6 +42,9 @@ constexpr PublishedRow kPublished[] = {
     {Deviation::kHadamard, "2.943883e-01", "1.052754e-01", "3.910861e-02"},
     {Deviation::kOverlappingHadamard, "2.943883e-01", "9.581083e-02", "3.237638e-02"},
     {Deviation::kTotal, "2.922319e-01", "9.134743e-02", "3.406530e-02"},
+    {Deviation::kModifiedTotal, "2.418528e-01", "6.499161e-02", "2.287774e-02"},
+    {Deviation::kTimeTotal, "1.396338e-01", "3.752293e-01", "1.320847e+00"},
+    {Deviation::kHadamardTotal, "2.943883e-01", "9.614788e-02", "3.058103e-02"},
 };
 
 TEST(Stability, equals_the_published_figures_of_the_nist_data_set_to_the_printed_digits) {
@@ -171,6 +177,74 @@ TEST(Stability, interval_of_68_percent_covers_the_truth_in_68_percent_of_records
   }
   EXPECT_NEAR(covered[0], 0.683 * kRecords, 0.08 * kRecords);
   EXPECT_NEAR(covered[1], 0.683 * kRecords, 0.08 * kRecords);
+}
+
+/// Share of records whose interval at m covers the root of the mean of their variances.
+double coverage(Deviation deviation, std::size_t m,
+                const std::function<std::vector<double>(std::uint32_t)>& phase) {
+  constexpr std::uint32_t kRecords = 200;
+  std::vector<StabilityPoint> points;
+  double square = 0.0;
+  for (std::uint32_t seed = 0; seed < kRecords; ++seed) {
+    const std::vector<double> record = phase(seed);
+    const std::size_t factors[] = {32, m};  // of 1,024 points: the last that tells the noise
+    points.push_back(stability(deviation, {record, 1.0}, factors).back());
+    square += points.back().deviation * points.back().deviation / kRecords;
+  }
+  const double truth = std::sqrt(square);
+  return static_cast<double>(
+             std::count_if(points.begin(), points.end(),
+                           [truth](const auto& p) { return p.lower < truth && truth < p.upper; })) /
+         kRecords;
+}
+
+TEST(Stability, interval_is_wide_enough_where_too_few_points_are_left_to_tell_the_noise) {
+  // White PM that covers a random walk of the frequency until some hundred intervals: the noise of
+  // the last tau with thirty points is not that of the longest.
+  const auto changing = [](std::uint32_t seed) {
+    auto phase = test::running_sum(test::running_sum(test::white_noise(1024, 1e-3, 5000 + seed)));
+    const auto white = test::white_noise(phase.size(), 1.0, 9000 + seed);
+    for (std::size_t i = 0; i < phase.size(); ++i) phase[i] += white[i];
+    return phase;
+  };
+  for (const auto deviation :
+       {Deviation::kOverlappingAllan, Deviation::kModifiedAllan, Deviation::kOverlappingHadamard,
+        Deviation::kTotal, Deviation::kModifiedTotal, Deviation::kHadamardTotal}) {
+    for (const std::size_t m : {std::size_t{64}, std::size_t{128}, std::size_t{256}}) {
+      EXPECT_GT(coverage(deviation, m, changing), 0.58) << name(deviation) << " at " << m;
+    }
+  }
+}
+
+TEST(Stability, total_deviations_of_stretches_change_little_where_not_every_stretch_is_taken) {
+  const auto phase = test::running_sum(test::white_noise(40000, 1.0, 3));
+  const std::size_t factors[] = {64, 128};  // N m: below and above kMostExactTotal
+  const auto points = stability(Deviation::kModifiedTotal, {phase, 1.0}, factors);
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_GT(points[0].terms, 39000U);
+  EXPECT_LT(points[1].terms, 5000U);
+  EXPECT_NEAR(points[1].deviation * std::sqrt(128.0), points[0].deviation * std::sqrt(64.0),
+              0.1 * points[0].deviation * std::sqrt(64.0));
+}
+
+TEST(Stability, names_lead_back) {
+  for (const Deviation deviation : all_deviations()) {
+    std::string word = name(deviation);
+    for (char& letter : word) letter = static_cast<char>(std::tolower(letter));
+    EXPECT_EQ(deviation_named(word), deviation);
+    EXPECT_EQ(deviation_named(name(deviation)), std::nullopt);
+  }
+  EXPECT_EQ(deviation_named(""), std::nullopt);
+}
+
+TEST(Factors, all_are_every_one_of_a_short_record_and_a_thousand_of_a_long_one) {
+  EXPECT_EQ(all_factors(7), (std::vector<std::size_t>{1, 2, 3}));
+  EXPECT_TRUE(all_factors(2).empty());
+  const auto many = all_factors(1'000'000);
+  EXPECT_LE(many.size(), 1001U);
+  EXPECT_EQ(many.front(), 1U);
+  EXPECT_GT(many.back(), 490'000U);
+  EXPECT_TRUE(std::is_sorted(many.begin(), many.end()));
 }
 
 TEST(Stability, keeps_its_level_when_a_tenth_of_the_points_is_missing) {

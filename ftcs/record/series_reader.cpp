@@ -12,6 +12,7 @@
 #include "ftcs/record/offset_log.h"
 #include "ftcs/record/time_grid.h"
 #include "ftcs/record/units.h"
+#include "ftcs/record/value_scale.h"
 
 namespace ftcs {
 namespace {
@@ -33,7 +34,7 @@ struct TableLayout {
   std::size_t columns = 0;
   std::size_t value_column = 0;
   std::optional<std::size_t> time_column;
-  double value_scale = 1.0;
+  ValueScale value_scale;
   double time_scale = 1.0;
 };
 
@@ -79,41 +80,6 @@ std::string no_such_column(const TableLayout& layout, const std::string& wanted)
   return message;
 }
 
-RecordKind kind_of(const SeriesOptions& options, std::string_view heading) {
-  if (options.kind) return *options.kind;
-  const std::string unit = options.unit.empty() ? unit_in_heading(heading) : options.unit;
-  const std::string word = lower(heading);
-  if (fraction_of_unit(unit) || word.find("freq") != std::string::npos)
-    return RecordKind::kFrequency;
-  return word.find("offset") != std::string::npos ? RecordKind::kOffset : RecordKind::kPhase;
-}
-
-/// Unit of the values, and their scale to seconds or fractions.
-Result<double, ReadError> choose_unit(const SeriesOptions& options, std::string_view heading,
-                                      Series& series, const LineReader& reader) {
-  const bool frequency = series.kind == RecordKind::kFrequency;
-  std::string unit = options.unit;
-  const char* reason = "as asked";
-  if (unit.empty()) {
-    unit = unit_in_heading(heading);
-    reason = "from the heading";
-  }
-  if (unit.empty()) {
-    unit = frequency ? "1" : series.kind == RecordKind::kOffset ? "ns" : "s";
-    reason = "by convention; --unit sets it";
-  }
-  const auto scale = frequency ? fraction_of_unit(unit) : seconds_of_unit(unit);
-  if (!scale) {
-    return reader.error_here("the unit of " + std::string(name(series.kind)) +
-                             " values is one of " +
-                             (frequency ? "1, ppm, ppb, ppt" : "s, ms, us, ns, ps, d") + ", got " +
-                             quoted_excerpt(unit));
-  }
-  series.notes.push_back("values: " + std::string(name(series.kind)) + " in " + unit + " (" +
-                         reason + ")");
-  return *scale;
-}
-
 class TableReader {
  public:
   TableReader(LineReader& reader, const SeriesOptions& options, Series& series)
@@ -151,7 +117,8 @@ class TableReader {
                                 std::to_string(layout_.value_column + 1) + ", got " +
                                 quoted_excerpt(field));
     }
-    raw.values.push_back(value ? *value * layout_.value_scale : kMissing);
+    raw.values.push_back(value ? (*value - layout_.value_scale.origin) * layout_.value_scale.factor
+                               : kMissing);
     return std::nullopt;
   }
 
@@ -192,8 +159,9 @@ class TableReader {
     series_.notes.push_back("values from column " + std::to_string(layout_.value_column + 1) +
                             (heading.empty() ? "" : " " + quoted_excerpt(heading)) + " of " +
                             std::to_string(layout_.columns));
-    const auto scale = choose_unit(options_, heading, series_, reader_);
-    if (!scale) return scale.error();
+    const auto scale = choose_scale(options_, series_.kind, heading);
+    if (!scale) return reader_.error_here(scale.error());
+    series_.notes.push_back(scale->note);
     layout_.value_scale = *scale;
     if (!layout_.time_column) return std::nullopt;
     std::string unit = options_.time_unit;
@@ -314,6 +282,8 @@ std::optional<ReadError> finish(RawSeries raw, const SeriesOptions& options,
                               std::to_string(reader.line_number()) + " lines";
     return whole;
   }
+  whole.message = suspicion_of_hertz(raw.values, series.kind, options);
+  if (!whole.message.empty()) return whole;
   if (raw.times.size() == raw.values.size()) {
     auto grid = place_on_grid(raw.values, raw.times, options.interval_s);
     if (!grid) {

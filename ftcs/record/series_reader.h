@@ -29,7 +29,8 @@ struct SeriesOptions {
   std::string time_unit;    ///< empty = s
   std::string unit;         ///< of the values; empty = by heading (offset_ns), else by kind
   std::optional<RecordKind> kind;
-  std::optional<double> interval_s;  ///< tau_0; else the median step of the times, else 1 s
+  std::optional<double> nominal_hz;  ///< of values in Hz: what they should be
+  std::optional<double> interval_s;  ///< tau_0; else that of the times (time_grid.h), else 1 s
   std::string source;  ///< of a log with several: "phc2sys CLOCK_REALTIME"; empty = most lines
 };
 
@@ -53,8 +54,8 @@ struct Series {
 /// taken whole. Of several programs or clocks in one log one is taken, never a mixture.
 ///
 /// Errors: no such column, a field that is no number, a short line, times that go backwards, an
-/// unknown unit, no numbers at all, a gap that is larger than the record could explain; everything
-/// that LineReader finds.
+/// unknown unit, a record in Hz without its nominal frequency, no numbers at all, a gap that is
+/// larger than the record could explain; everything that LineReader finds.
 [[nodiscard]] Result<Series, ReadError> read_series(const std::string& path,
                                                     const SeriesOptions& options);
 

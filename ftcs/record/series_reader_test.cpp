@@ -49,6 +49,48 @@ TEST_F(SeriesReader, takes_the_first_of_two_columns_for_time) {
   EXPECT_EQ(series->missing, 1U);
 }
 
+TEST_F(SeriesReader, takes_a_record_in_hertz_with_its_nominal_frequency) {
+  SeriesOptions options;
+  options.unit = "Hz";
+  options.nominal_hz = 10e6;
+  const auto series = read("9999999.99\n10000000.02\n10000000\n", options);
+  ASSERT_TRUE(series.ok()) << series.error().text();
+  EXPECT_EQ(series->kind, RecordKind::kFrequency);
+  EXPECT_NEAR(series->values[0], -1e-9, 1e-16);
+  EXPECT_NEAR(series->values[1], 2e-9, 1e-16);
+  EXPECT_EQ(series->values[2], 0.0);
+  options.unit.clear();
+  const auto headed = read("t,freq_MHz\n0,10.0000001\n1,9.9999999\n", options);
+  ASSERT_TRUE(headed.ok()) << headed.error().text();
+  EXPECT_NEAR(headed->values[0], 1e-8, 1e-15);
+}
+
+TEST_F(SeriesReader, refuses_hertz_without_a_nominal_frequency_and_the_other_way_round) {
+  SeriesOptions options;
+  options.unit = "Hz";
+  options.kind = RecordKind::kFrequency;
+  EXPECT_NE(error("10000000.1\n9999999.9\n", options).find("--nominal"), std::string::npos);
+  EXPECT_NE(error("t,f_MHz\n0,10.0000001\n").find("--nominal"), std::string::npos);
+  options.unit = "ppb";
+  options.nominal_hz = 10e6;
+  EXPECT_NE(error("1\n2\n", options).find("belongs to values in Hz"), std::string::npos);
+}
+
+TEST_F(SeriesReader, does_not_analyse_hertz_as_phase_or_fraction) {
+  const std::string hertz = "9999999.99\n10000000.02\n10000000\n";
+  EXPECT_NE(error(hertz).find("--unit Hz --nominal"), std::string::npos);
+  SeriesOptions options;
+  options.kind = RecordKind::kFrequency;
+  EXPECT_NE(error(hertz, options).find("--unit Hz --nominal"), std::string::npos);
+  EXPECT_NE(error("time,freq\n0,9999999.99\n1,10000000.02\n").find("--unit Hz"), std::string::npos);
+  options.unit = "1";
+  EXPECT_TRUE(read(hertz, options).ok());
+  options = {};
+  options.kind = RecordKind::kPhase;
+  EXPECT_TRUE(read(hertz, options).ok());
+  EXPECT_TRUE(read("0\n1000\n2000\n3000\n").ok());  // a phase that runs away
+}
+
 TEST_F(SeriesReader, learns_kind_and_units_from_headings) {
   const auto series = read("time_ms,state,offset_us\n0,x,1\n250,y,-2\n500,z,nan\n");
   SeriesOptions options;

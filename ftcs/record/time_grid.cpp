@@ -5,6 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
+#include "ftcs/record/fields.h"
+
 namespace ftcs {
 namespace {
 
@@ -23,6 +27,72 @@ double median_step(std::span<const double> times_s) {
   return *middle;
 }
 
+/// Number of the place of each time on a grid of about `step`, from 0.
+std::vector<double> places_of(std::span<const double> times_s, double step) {
+  std::vector<double> places = {0.0};
+  for (std::size_t i = 1; i < times_s.size(); ++i)
+    places.push_back(places.back() + std::round((times_s[i] - times_s[i - 1]) / step));
+  return places;
+}
+
+/// The decimal number with the fewest digits within `tolerance` of `value`.
+double shortest_within(double value, double tolerance) {
+  constexpr int kMostDigits = 17;
+  for (int digits = 1; digits < kMostDigits; ++digits) {
+    const auto rounded = parse_decimal(fmt::format("{:.{}e}", value, digits - 1));
+    if (rounded && std::abs(*rounded - value) <= tolerance) return *rounded;
+  }
+  return value;
+}
+
+struct Slope {
+  double value = 0.0;
+  double deviation = 0.0;  ///< standard deviation, from the scatter about the line
+};
+
+/// Least squares of the times over their places.
+Slope slope_of(std::span<const double> times_s, std::span<const double> places) {
+  const auto count = static_cast<double>(places.size());
+  double mean_place = 0.0;
+  double mean_time = 0.0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    mean_place += places[i] / count;
+    mean_time += (times_s[i] - times_s[0]) / count;
+  }
+  double squares = 0.0;
+  double products = 0.0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    squares += (places[i] - mean_place) * (places[i] - mean_place);
+    products += (places[i] - mean_place) * (times_s[i] - times_s[0] - mean_time);
+  }
+  Slope slope{products / squares, 0.0};
+  double scatter = 0.0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double residual =
+        times_s[i] - times_s[0] - mean_time - slope.value * (places[i] - mean_place);
+    scatter += residual * residual / count;
+  }
+  slope.deviation = std::sqrt(scatter / squares);
+  return slope;
+}
+
+/// The step of times that may be rounded: 62.5 ms stamped in ms are steps of 62 and 63. The median
+/// step counts the places, a straight line through them is the interval, and of what the scatter
+/// about the line permits the shortest number is meant.
+double typical_step(std::span<const double> times_s) {
+  const double median = median_step(times_s);
+  if (!(median > 0.0)) return median;
+  Slope slope{median, 0.0};
+  constexpr int kRounds = 3;  // a long gap has its places only when the step is nearly right
+  for (int round = 0; round < kRounds; ++round) {
+    slope = slope_of(times_s, places_of(times_s, slope.value));
+    // Farther off the places themselves are in doubt: jitter as long as the interval.
+    if (!(std::abs(slope.value - median) < 0.5 * median)) return median;
+  }
+  constexpr double kDeviations = 3.0;
+  return shortest_within(slope.value, kDeviations * slope.deviation);
+}
+
 }  // namespace
 
 Result<GriddedValues, GridError> place_on_grid(std::span<const double> values,
@@ -30,7 +100,7 @@ Result<GriddedValues, GridError> place_on_grid(std::span<const double> values,
                                                std::optional<double> interval_s) {
   GriddedValues grid;
   if (values.empty()) return grid;
-  grid.interval_s = interval_s ? *interval_s : times_s.size() > 1 ? median_step(times_s) : 1.0;
+  grid.interval_s = interval_s ? *interval_s : times_s.size() > 1 ? typical_step(times_s) : 1.0;
   if (!(grid.interval_s > 0.0)) {
     return GridError{"half of the times do not advance: is the time column right?"};
   }

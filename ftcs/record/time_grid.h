@@ -22,8 +22,9 @@ struct GridError {
   std::string message;
 };
 
-/// Puts values with ascending times on a grid of `interval_s`, or of the median step if none is
-/// given.
+/// Puts values with ascending times on a grid of `interval_s`, or of their own if none is
+/// given: a straight line through the times, of whose slope the shortest number within three
+/// standard deviations is taken (stamps rounded to milliseconds do not change 62.5 ms).
 ///
 /// Step by step: the next place is the nearest one to the time that has passed, at least one; the
 /// grid follows the times with a gain of kGridGain, so that jitter of a log moves nothing and a

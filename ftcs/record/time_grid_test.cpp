@@ -25,6 +25,29 @@ TEST(TimeGrid, takes_the_median_step_and_leaves_gaps_open) {
   EXPECT_EQ(grid->values[6], 3.0);
 }
 
+TEST(TimeGrid, finds_an_interval_that_the_stamps_are_too_coarse_to_show) {
+  for (const double interval : {0.0625, 0.125, 0.0078125, 1.0, 0.1}) {
+    std::vector<double> times(4000);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      times[i] = std::round((17.3 + interval * static_cast<double>(i)) * 1e3) * 1e-3;
+    }
+    times.erase(times.begin() + 100, times.begin() + 140);  // a gap
+    const auto grid = place_on_grid(count_up(times.size()), times, std::nullopt);
+    ASSERT_TRUE(grid.ok());
+    EXPECT_DOUBLE_EQ(grid->interval_s, interval);
+    EXPECT_EQ(grid->values.size(), 4000U);
+    EXPECT_EQ(grid->crowded, 0U);
+  }
+}
+
+TEST(TimeGrid, does_not_call_a_clock_that_is_slow_by_ten_ppm_exact) {
+  std::vector<double> times = count_up(100000);
+  for (double& time : times) time *= 1.00001;
+  const auto grid = place_on_grid(count_up(times.size()), times, std::nullopt);
+  ASSERT_TRUE(grid.ok());
+  EXPECT_NEAR(grid->interval_s, 1.00001, 1e-9);
+}
+
 TEST(TimeGrid, is_not_moved_by_jitter_nor_by_an_interval_that_is_slightly_wrong) {
   std::vector<double> times = count_up(10000);
   for (double& time : times) {

@@ -18,6 +18,9 @@ constexpr std::array<Unit, 6> kTimeUnits = {
 constexpr std::array<Unit, 4> kFractionUnits = {
     {{"1", 1.0}, {"ppm", 1e-6}, {"ppb", 1e-9}, {"ppt", 1e-12}}};
 
+constexpr std::array<Unit, 4> kFrequencyUnits = {
+    {{"Hz", 1.0}, {"kHz", 1e3}, {"MHz", 1e6}, {"GHz", 1e9}}};
+
 template <std::size_t N>
 std::optional<double> find(const std::array<Unit, N>& units, std::string_view name) {
   for (const auto& [unit, factor] : units) {
@@ -32,6 +35,8 @@ std::optional<double> seconds_of_unit(std::string_view unit) { return find(kTime
 
 std::optional<double> fraction_of_unit(std::string_view unit) { return find(kFractionUnits, unit); }
 
+std::optional<double> hertz_of_unit(std::string_view unit) { return find(kFrequencyUnits, unit); }
+
 std::string unit_in_heading(std::string_view heading) {
   const auto last = heading.find_last_not_of(kAround);
   if (last == std::string_view::npos) return {};
@@ -39,7 +44,8 @@ std::string unit_in_heading(std::string_view heading) {
   if (before == std::string_view::npos) return {};  // the heading is one word: no unit behind it
   const std::string_view word = heading.substr(before + 1, last - before);
   // "column 1" is no unit.
-  const bool known = word != "1" && (seconds_of_unit(word) || fraction_of_unit(word));
+  const bool known =
+      word != "1" && (seconds_of_unit(word) || fraction_of_unit(word) || hertz_of_unit(word));
   return known ? std::string(word) : std::string();
 }
 

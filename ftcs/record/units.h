@@ -13,6 +13,9 @@ namespace ftcs {
 /// Fractional frequency of a unit: 1, ppm, ppb, ppt.
 [[nodiscard]] std::optional<double> fraction_of_unit(std::string_view unit);
 
+/// Hertz in a unit of frequency: Hz, kHz, MHz, GHz.
+[[nodiscard]] std::optional<double> hertz_of_unit(std::string_view unit);
+
 /// The unit at the end of a heading: "offset_ns", "offset (ns)", "offset / ns", "freq [ppb]"; empty
 /// if there is none.
 [[nodiscard]] std::string unit_in_heading(std::string_view heading);

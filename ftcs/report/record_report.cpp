@@ -2,6 +2,7 @@
 #include "ftcs/report/record_report.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 
@@ -30,19 +31,17 @@ std::string confidence_text(double confidence) {
   return fmt::format("{:.1f} %", 100.0 * confidence);
 }
 
-/// The statistics in the order of every list, and their names in JSON.
-struct NamedCurve {
-  const char* title;
-  const char* key;
-  const std::vector<StabilityPoint>* points;
-};
+/// Its name in JSON and CSV.
+std::string key(Deviation deviation) {
+  std::string text = name(deviation);
+  for (char& letter : text)
+    letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  return text;
+}
 
-std::vector<NamedCurve> curves(const AnalysedRecord& record) {
-  const RecordAnalysis& analysis = record.analysis;
-  return {{"OADEV", "oadev", &analysis.overlapping_allan},
-          {"MDEV", "mdev", &analysis.modified_allan},
-          {"OHDEV", "ohdev", &analysis.overlapping_hadamard},
-          {"TDEV", "tdev", &analysis.time}};
+/// TDEV and TTOTDEV are times, all others are frequencies.
+bool is_time(Deviation deviation) {
+  return deviation == Deviation::kTime || deviation == Deviation::kTimeTotal;
 }
 
 const StabilityPoint* at_factor(const std::vector<StabilityPoint>& points, std::size_t factor) {
@@ -147,10 +146,9 @@ Plot histogram_plot(const AnalysedRecord& record) {
 Plot deviation_plot(const AnalysedRecord& record) {
   Plot plot{"Frequency stability",      "tau / s", "deviation", true, true,
             PlotStyle::kLineWithPoints, {},        ""};
-  for (const NamedCurve& curve : curves(record)) {
-    if (curve.points != &record.analysis.time) {
-      plot.series.push_back(deviation_series(curve.title, *curve.points));
-    }
+  for (const StabilityCurve& curve : record.analysis.curves) {
+    if (!is_time(curve.deviation))
+      plot.series.push_back(deviation_series(name(curve.deviation), curve.points));
   }
   plot.note = fmt::format("Bands: confidence intervals of {}. NIST SP 1065.",
                           confidence_text(record.confidence));
@@ -166,12 +164,23 @@ Plot wander_plot(const AnalysedRecord& record) {
             PlotStyle::kLineWithPoints,
             {},
             ""};
-  plot.series = {deviation_series("TDEV", record.analysis.time),
-                 mtie_series("MTIE", record.analysis.wander)};
-  plot.series[1].lower = plot.series[1].y;
-  plot.series[1].upper = plot.series[1].y;
+  for (const StabilityCurve& curve : record.analysis.curves) {
+    if (is_time(curve.deviation))
+      plot.series.push_back(deviation_series(name(curve.deviation), curve.points));
+  }
+  plot.series.push_back(mtie_series("MTIE", record.analysis.wander));
+  plot.series.back().lower = plot.series.back().y;
+  plot.series.back().upper = plot.series.back().y;
   plot.note = "ITU-T G.810. MTIE is a maximum over this record and has no interval.";
   return plot;
+}
+
+/// Below the table.
+std::string interval_text(const AnalysedRecord& record) {
+  const auto& curves = record.analysis.curves;
+  return fmt::format("lower, upper: interval of {} for {} (NIST SP 1065).",
+                     confidence_text(record.confidence),
+                     curves.empty() ? "nothing" : name(curves.front().deviation));
 }
 
 std::vector<LabelledText> parameters(const AnalysedRecord& record) {
@@ -188,15 +197,15 @@ std::vector<LabelledText> parameters(const AnalysedRecord& record) {
 
 }  // namespace
 
-AnalysedRecord analyse_series(std::string file, Series series, double confidence) {
+AnalysedRecord analyse_series(std::string file, Series series, const AnalysisOptions& options) {
   AnalysedRecord record;
   record.file = std::move(file);
   record.series = std::move(series);
-  record.confidence = confidence;
+  record.confidence = options.confidence;
   record.phase = is_frequency(record)
                      ? phase_from_frequency(record.series.values, record.series.interval_s)
                      : record.series.values;
-  record.analysis = analyse_record({record.phase, record.series.interval_s}, confidence);
+  record.analysis = analyse_record({record.phase, record.series.interval_s}, options);
   if (is_frequency(record)) record.analysis.summary = summarize(record.series.values);
   return record;
 }
@@ -218,44 +227,52 @@ std::vector<LabelledText> headline_figures(const AnalysedRecord& record) {
       {"mean frequency", fraction_text(record.analysis.line.slope)},
       {"RMS about the line", seconds_text(record.analysis.line.residual_rms)},
   };
-  if (!record.analysis.overlapping_allan.empty()) {
-    const StabilityPoint& first = record.analysis.overlapping_allan.front();
-    figures.emplace_back("OADEV at " + seconds_text(first.tau_s), significant(first.deviation));
+  const auto& curves = record.analysis.curves;
+  if (!curves.empty() && !curves.front().points.empty()) {
+    const StabilityPoint& first = curves.front().points.front();
+    figures.emplace_back(
+        fmt::format("{} at {}", name(curves.front().deviation), seconds_text(first.tau_s)),
+        significant(first.deviation));
     figures.emplace_back("noise at " + seconds_text(first.tau_s), name(first.noise));
   }
   return figures;
 }
 
 Table stability_table(const AnalysedRecord& record) {
-  Table table(
-      {"tau / s", "OADEV", "lower", "upper", "MDEV", "OHDEV", "TDEV / s", "MTIE / s", "noise"});
   const RecordAnalysis& analysis = record.analysis;
-  for (const StabilityPoint& point : analysis.overlapping_allan) {
+  std::vector<std::string> titles = {"tau / s"};
+  for (const StabilityCurve& curve : analysis.curves) {
+    titles.push_back(std::string(name(curve.deviation)) + (is_time(curve.deviation) ? " / s" : ""));
+    if (&curve == &analysis.curves.front()) titles.insert(titles.end(), {"lower", "upper"});
+  }
+  titles.insert(titles.end(), {"MTIE / s", "noise"});
+  Table table(std::move(titles));
+  if (analysis.curves.empty()) return table;
+  for (const StabilityPoint& point : analysis.curves.front().points) {
     const std::size_t factor = point.averaging_factor;
     const auto wander =
         std::find_if(analysis.wander.begin(), analysis.wander.end(),
                      [factor](const MtiePoint& other) { return other.averaging_factor == factor; });
-    const auto cell = [factor](const std::vector<StabilityPoint>& points) {
-      const StabilityPoint* other = at_factor(points, factor);
-      return Cell::significant(other == nullptr ? kNoFigure : other->deviation);
-    };
-    table.add_row({Cell::significant(point.tau_s), Cell::significant(point.deviation),
-                   Cell::significant(point.lower), Cell::significant(point.upper),
-                   cell(analysis.modified_allan), cell(analysis.overlapping_hadamard),
-                   cell(analysis.time),
-                   Cell::significant(wander == analysis.wander.end() ? kNoFigure : wander->mtie_s),
-                   name(point.noise)});
+    std::vector<Cell> row = {Cell::significant(point.tau_s), Cell::significant(point.deviation),
+                             Cell::significant(point.lower), Cell::significant(point.upper)};
+    for (std::size_t i = 1; i < analysis.curves.size(); ++i) {
+      const StabilityPoint* other = at_factor(analysis.curves[i].points, factor);
+      row.push_back(Cell::significant(other == nullptr ? kNoFigure : other->deviation));
+    }
+    row.push_back(Cell::significant(wander == analysis.wander.end() ? kNoFigure : wander->mtie_s));
+    row.emplace_back(name(point.noise));
+    table.add_row(std::move(row));
   }
   return table;
 }
 
 Table stability_list(const AnalysedRecord& record) {
   Table table({"statistic", "tau_s", "value", "lower", "upper", "terms", "noise"});
-  for (const NamedCurve& curve : curves(record)) {
-    for (const StabilityPoint& point : *curve.points) {
-      table.add_row({curve.key, Cell::significant(point.tau_s), Cell::significant(point.deviation),
-                     Cell::significant(point.lower), Cell::significant(point.upper),
-                     Cell::count(point.terms), name(point.noise)});
+  for (const StabilityCurve& curve : record.analysis.curves) {
+    for (const StabilityPoint& point : curve.points) {
+      table.add_row({key(curve.deviation), Cell::significant(point.tau_s),
+                     Cell::significant(point.deviation), Cell::significant(point.lower),
+                     Cell::significant(point.upper), Cell::count(point.terms), name(point.noise)});
     }
   }
   for (const MtiePoint& point : record.analysis.wander) {
@@ -273,8 +290,7 @@ std::string console_report(const AnalysedRecord& record) {
   Table figures({"figure", "value"});
   for (const auto& [label, value] : headline_figures(record)) figures.add_row({label, value});
   text += figures.to_text() + '\n' + stability_table(record).to_text();
-  return text + fmt::format("\nlower, upper: interval of {} for OADEV (NIST SP 1065).\n",
-                            confidence_text(record.confidence));
+  return text + '\n' + interval_text(record) + '\n';
 }
 
 Json json_report(const AnalysedRecord& record) {
@@ -291,8 +307,8 @@ Json json_report(const AnalysedRecord& record) {
                                          : to_json(record.analysis.summary, "ns", kNanosecond);
   json["mean_frequency"] = record.analysis.line.slope;
   json["residual_rms_ns"] = record.analysis.line.residual_rms / kNanosecond;
-  for (const NamedCurve& curve : curves(record))
-    json["stability"][curve.key] = to_json(*curve.points);
+  for (const StabilityCurve& curve : record.analysis.curves)
+    json["stability"][key(curve.deviation)] = to_json(curve.points);
   json["mtie"] = to_json(record.analysis.wander);
   return json;
 }
@@ -308,9 +324,7 @@ std::string html_report(const AnalysedRecord& record) {
   report.add_plot(histogram_plot(record));
   report.add_plot(deviation_plot(record));
   report.add_plot(wander_plot(record));
-  report.add_table(
-      "Stability", stability_table(record),
-      "lower, upper: confidence interval of " + confidence_text(record.confidence) + " for OADEV.");
+  report.add_table("Stability", stability_table(record), interval_text(record));
   report.add_parameters(parameters(record));
   return report.render();
 }

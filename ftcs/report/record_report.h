@@ -22,13 +22,13 @@ struct AnalysedRecord {
   double confidence = kOneSigmaConfidence;
 };
 
-/// `confidence`: 0 < confidence < 1.
-[[nodiscard]] AnalysedRecord analyse_series(std::string file, Series series, double confidence);
+[[nodiscard]] AnalysedRecord analyse_series(std::string file, Series series,
+                                            const AnalysisOptions& options = {});
 
 /// Headline figures: samples, span, mean frequency; of offsets and phases mean, RMS, percentiles,
 /// max |TE|.
 [[nodiscard]] std::vector<LabelledText> headline_figures(const AnalysedRecord& record);
-/// One row for each tau: OADEV with its interval, MDEV, OHDEV, TDEV, MTIE, noise.
+/// One row for each tau: the first statistic with its interval, the others, MTIE, noise.
 [[nodiscard]] Table stability_table(const AnalysedRecord& record);
 /// One row for each statistic and tau: statistic, tau_s, value, lower, upper, terms, noise.
 [[nodiscard]] Table stability_list(const AnalysedRecord& record);

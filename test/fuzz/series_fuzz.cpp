@@ -49,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(series->samples + series->missing == series->values.size(), "every place is counted");
   require(std::isfinite(series->interval_s) && series->interval_s > 0.0, "time goes on");
   if (series->values.size() > kMostAnalysed) return 0;
-  const auto record = ftcs::analyse_series("input", *series, 0.95);
+  const auto record = ftcs::analyse_series("input", *series);
   require(ftcs::Json::accept(ftcs::dump(ftcs::json_report(record))), "JSON can be read");
   require(!ftcs::console_report(record).empty() && !ftcs::html_report(record).empty(),
           "a report has words");
