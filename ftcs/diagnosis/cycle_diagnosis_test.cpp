@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/diagnosis/cycle_diagnosis.h"
+
+#include <array>
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "test/support/forbid_allocation.h"
+
+namespace ftcs::diagnosis {
+namespace {
+
+CycleSeen good() {
+  CycleSeen seen;
+  seen.state = CycleState::kLocked;
+  seen.drives = seen.expected_drives = 8;
+  seen.working_counter = seen.expected_counter = 24;
+  seen.cycles = 1000;
+  seen.margin_ns = 400e3;
+  seen.gate_ns = 200e3;
+  seen.cycle_ns = 1e6;
+  return seen;
+}
+
+struct Case {
+  Cause cause;
+  std::function<void(CycleSeen&)> change;
+  const char* part;
+};
+
+const std::array kCases{
+    Case{Cause::kLocked, [](CycleSeen&) {}, "locked: phase"},
+    Case{Cause::kNoSubDevice, [](CycleSeen& s) { s.failure = ethercat::FailureKind::kNoReply; },
+         "no SubDevice answers"},
+    Case{Cause::kTooFewSubDevices, [](CycleSeen& s) { s.drives = 5; }, "5 SubDevices of 8"},
+    Case{Cause::kNoDistributedClock, [](CycleSeen& s) { s.has_reference = false; }, "--servo none"},
+    Case{Cause::kLostFrames, [](CycleSeen& s) { s.lost = 200; }, "200 of the last 1000 frames"},
+    Case{Cause::kWorkingCounter, [](CycleSeen& s) { s.working_counter = 21; }, "21 of 24"},
+    Case{Cause::kHostLate, [](CycleSeen& s) { s.late = 300; }, "more than 200 us late"},
+    Case{Cause::kMarginTooSmall, [](CycleSeen& s) { s.margin_ns = 20e3; }, "--sync0-phase"},
+    Case{Cause::kAcquiring, [](CycleSeen& s) { s.state = CycleState::kAcquiring; }, "phase"},
+    Case{Cause::kDrivesNotOperational, [](CycleSeen& s) { s.operational = false; }, "AL status"},
+};
+
+TEST(CycleDiagnosis, each_cause_has_its_sentence) {
+  for (const Case& one : kCases) {
+    CycleSeen seen = good();
+    one.change(seen);
+    const Finding found = diagnose(seen);
+    EXPECT_EQ(name(found.cause), name(one.cause));
+    std::array<char, 400> text{};
+    const std::string written(write_sentence(text, seen));
+    EXPECT_NE(written.find(one.part), std::string::npos) << written;
+    EXPECT_NE(written.find(found.seen), std::string::npos) << written;
+  }
+}
+
+TEST(CycleDiagnosis, only_a_locked_cycle_is_called_locked) {
+  for (const CycleState state :
+       {CycleState::kWaiting, CycleState::kAcquiring, CycleState::kCoasting}) {
+    for (const Case& one : kCases) {
+      CycleSeen seen = good();
+      one.change(seen);
+      seen.state = state;
+      std::array<char, 400> text{};
+      EXPECT_TRUE(write_sentence(text, seen).starts_with("not locked: "));
+    }
+  }
+}
+
+TEST(CycleDiagnosis, the_cyclic_path_touches_no_heap_and_no_more_than_its_room) {
+  std::array<char, 40> text{};
+  CycleSeen seen = good();
+  seen.late = 500;
+  std::string_view written;
+  {
+    const test::ForbidAllocation none;
+    written = write_sentence(text, seen);
+  }
+  EXPECT_LE(written.size(), text.size());
+  EXPECT_TRUE(written.starts_with("locked: 500 of"));
+}
+
+}  // namespace
+}  // namespace ftcs::diagnosis

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ftcs/diagnosis/finding.h"
+#include "ftcs/diagnosis/talkers.h"
+#include "ftcs/discipline/telemetry.h"
+#include "ftcs/ptp/counters.h"
+#include "ftcs/time/duration.h"
+
+namespace ftcs::diagnosis {
+
+/// What a PTP time receiver was told to listen to.
+struct PortSettings {
+  std::string interface;
+  Way way = Way::kUdpIpv4;
+  std::array<std::uint8_t, 6> group{};  ///< kEthernet: where Announce and Sync go
+  std::uint8_t domain = 0;
+  std::uint8_t major_sdo_id = 0;
+  bool peer_to_peer = false;
+  bool capability_needed = false;  ///< IEEE 802.1AS
+  Nanoseconds lowest_peer_delay{};
+  Nanoseconds highest_peer_delay{};
+  bool unicast = false;  ///< one configured peer instead of the group
+};
+
+/// What came of it, lately: counters are those of the last `seconds`, so that a sentence is of now.
+struct PortSeen {
+  PortSettings settings{};
+  double seconds = 0.0;
+  bool link_up = true;
+  bool has_transmitter = false;  ///< one is selected
+  ptp::Counters counters{};
+  Talkers at_port{};                 ///< by our own sockets
+  std::optional<Talkers> on_wire{};  ///< by a listener to all frames; none: nobody listened
+  std::uint64_t receive_stamps_missing = 0;
+  std::uint64_t unicast_dropped = 0;
+  std::uint64_t foreign_steps = 0;  ///< of the steered clock, by other programs
+  std::optional<Duration> peer_delay{};
+  // The clock.
+  bool locked = false;
+  bool path_delay_known = false;
+  ServoSnapshot servo{};
+  Rate rate{};
+  DisciplineCounters samples{};  ///< lately
+  std::string refusal{};         ///< why the reference's time is not believed; empty: it is
+};
+
+/// The first thing that stands between the port and its lock, in the order in which things must be
+/// there: link, messages, measurement, belief, servo. kLocked: nothing does.
+[[nodiscard]] Finding diagnose(const PortSeen& seen);
+/// All of them, the decisive one first; and remarks that keep nobody from locking come last.
+[[nodiscard]] std::vector<Finding> diagnose_all(const PortSeen& seen);
+
+}  // namespace ftcs::diagnosis

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+//
+// Each cause from what a port would have seen; test/doctor makes them on a real network.
+#include "ftcs/diagnosis/port_diagnosis.h"
+
+#include <functional>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/ptp/wire/codec.h"
+
+namespace ftcs::diagnosis {
+namespace {
+
+using ptp::Counter;
+
+struct Said {
+  std::uint8_t domain = 0;
+  std::uint8_t sdo = 0;
+  bool two_step = false;
+  std::uint8_t version = 2;
+};
+
+template <class Body>
+std::vector<std::uint8_t> message(const Body& body, const Said& said = {}) {
+  ptp::Message message;
+  message.header.domain = said.domain;
+  message.header.major_sdo_id = said.sdo;
+  if (said.two_step) message.header.flags = ptp::flag::kTwoStep;
+  message.header.source = {ptp::ClockIdentity{{0xA, 0xB, 0xC, 0xFF, 0xFE, 1, 2, 3}}, 1};
+  message.body = body;
+  const auto bytes = ptp::encode(message);
+  const auto view = bytes->view();
+  std::vector<std::uint8_t> octets(view.begin(), view.end());
+  octets[1] = static_cast<std::uint8_t>((octets[1] & 0xF0U) | said.version);
+  return octets;
+}
+
+PortSeen fresh() {
+  PortSeen seen;
+  seen.settings.interface = "eth0";
+  seen.seconds = 8.0;
+  return seen;
+}
+/// A transmitter announces and its Syncs come.
+PortSeen followed() {
+  PortSeen seen = fresh();
+  seen.has_transmitter = true;
+  seen.at_port.on_message(message(ptp::Announce{}), Way::kUdpIpv4);
+  seen.counters.add(Counter::kSyncReceived, 8);
+  seen.counters.add(Counter::kForwardPairs, 8);
+  return seen;
+}
+
+struct Case {
+  Cause cause;
+  PortSeen seen;
+  const char* remedy;  ///< a part of the sentence
+};
+
+PortSeen with(PortSeen seen, const std::function<void(PortSeen&)>& change) {
+  change(seen);
+  return seen;
+}
+
+std::vector<Case> heard() {
+  const auto say = [](const Said& said) {
+    return [said](PortSeen& seen) {
+      seen.at_port.on_message(message(ptp::Announce{}, said), Way::kUdpIpv4);
+    };
+  };
+  return {
+      {Cause::kNoAnnounce, fresh(), "ftcs doctor -i eth0"},
+      {Cause::kLinkDown, with(fresh(), [](PortSeen& s) { s.link_up = false; }), "ip link set eth0"},
+      {Cause::kDomain, with(fresh(), say({.domain = 5})), "--domainNumber 5"},
+      {Cause::kSdo, with(fresh(), say({.sdo = 1})), "--preset gptp"},
+      {Cause::kSdo, with(fresh(), say({.sdo = 3})), "--transportSpecific 3"},
+      {Cause::kVersion, with(fresh(), say({.version = 1})), "version 1"},
+      {Cause::kTransport,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.on_wire.emplace();
+              s.on_wire->on_message(message(ptp::Announce{}), Way::kEthernet);
+            }),
+       "; -2"},
+      {Cause::kNotDelivered,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.on_wire.emplace();
+              s.on_wire->on_message(message(ptp::Announce{}), Way::kUdpIpv4);
+            }),
+       "rp_filter"},
+      {Cause::kSyncWithoutAnnounce,
+       with(fresh(),
+            [](PortSeen& s) { s.at_port.on_message(message(ptp::Sync{}), Way::kUdpIpv4); }),
+       "320"},
+      {Cause::kOnlyReceivers,
+       with(fresh(),
+            [](PortSeen& s) { s.at_port.on_message(message(ptp::DelayReq{}), Way::kUdpIpv4); }),
+       "slaveOnly"},
+      {Cause::kNotAcceptable,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kUnacceptableTransmitter); }),
+       "--acceptable-transmitter"},
+      {Cause::kUnusableAnnounce,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kUnusableAnnounce); }),
+       "--clockIdentity"},
+      {Cause::kAlternate,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kAlternateTransmitter); }),
+       "alternateMasterFlag"},
+      {Cause::kUnicast, with(fresh(), [](PortSeen& s) { s.unicast_dropped = 3; }), "--unicast"},
+      {Cause::kMalformed,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kTruncated, 9); }), "9 malformed"},
+      {Cause::kNoPeer, with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kNotCapable); }),
+       "asCapable"},
+      {Cause::kPeerDelayLimit,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.counters.add(Counter::kNotCapable);
+              s.settings.highest_peer_delay = Nanoseconds{800};
+              s.peer_delay = Duration::from_ns(5000.0);
+            }),
+       "--neighborPropDelayThresh 10000"},
+      {Cause::kSeveralPeers,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.counters.add(Counter::kNotCapable);
+              s.counters.add(Counter::kSeveralResponders);
+            }),
+       "two ports answer"},
+  };
+}
+
+std::vector<Case> measured() {
+  const auto count = [](Counter counter, std::uint64_t times) {
+    return [counter, times](PortSeen& seen) { seen.counters.add(counter, times); };
+  };
+  return {
+      {Cause::kAcquiring, followed(), "the path delay is not known yet"},
+      {Cause::kLinkDown, with(followed(), [](PortSeen& s) { s.link_up = false; }), "eth0 is down"},
+      {Cause::kNoSync, with(followed(), [](PortSeen& s) { s.counters = {}; }), "port 319"},
+      {Cause::kNoFollowUp,
+       with(followed(),
+            [](PortSeen& s) {
+              s.counters = {};
+              s.counters.add(Counter::kSyncReceived, 8);
+              s.at_port.on_message(message(ptp::Sync{}, {.two_step = true}), Way::kUdpIpv4);
+            }),
+       "8 Syncs of two steps and no Follow_Up"},
+      {Cause::kNoReceiveStamps,
+       with(followed(),
+            [](PortSeen& s) {
+              s.counters = {};
+              s.receive_stamps_missing = 8;
+            }),
+       "-S"},
+      {Cause::kNoDelayResp, with(followed(), count(Counter::kDelayReqSent, 6)), "6 Delay_Req sent"},
+      {Cause::kOtherMechanism,
+       with(followed(),
+            [](PortSeen& s) {
+              s.counters.add(Counter::kDelayReqSent, 6);
+              s.at_port.on_message(message(ptp::PdelayReq{}), Way::kUdpIpv4);
+            }),
+       "; -P"},
+      {Cause::kDelayRespForOthers,
+       with(followed(),
+            [](PortSeen& s) {
+              s.counters.add(Counter::kDelayReqSent, 6);
+              s.counters.add(Counter::kWrongRequestingPort, 6);
+            }),
+       "to other ports"},
+      {Cause::kNoTransmitStamps, with(followed(), count(Counter::kMissingTransmitStamp, 4)),
+       "--tx_timestamp_timeout"},
+      {Cause::kNoPeer, with(followed(), [](PortSeen& s) { s.settings.peer_to_peer = true; }),
+       "; -E"},
+      {Cause::kTwoTransmitters, with(followed(), count(Counter::kTransmitterChanges, 5)),
+       "changed 5 times"},
+      {Cause::kTwoTransmitters, with(followed(), count(Counter::kSequenceRestarts, 5)),
+       "one identity"},
+      {Cause::kTimescale, with(followed(), [](PortSeen& s) { s.refusal = "it shows 1970"; }),
+       "1970"},
+      {Cause::kOtherSteers, with(followed(), [](PortSeen& s) { s.foreign_steps = 2; }), "chrony"},
+      {Cause::kSamplesRefused, with(followed(), [](PortSeen& s) { s.samples.rejected = 9; }),
+       "9 of 9"},
+  };
+}
+
+TEST(PortDiagnosis, each_cause_has_its_sentence_and_none_says_locked) {
+  for (const auto& cases : {heard(), measured()}) {
+    for (const Case& one : cases) {
+      const Finding found = diagnose(one.seen);
+      const std::string text = sentence(found);
+      EXPECT_EQ(name(found.cause), name(one.cause)) << text;
+      EXPECT_NE(text.find(one.remedy), std::string::npos) << text;
+      EXPECT_TRUE(text.starts_with("not locked: ")) << text;
+    }
+  }
+}
+
+TEST(PortDiagnosis, a_locked_port_says_so_whatever_else_was_counted) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  seen.counters.add(Counter::kMissingTransmitStamp, 3);
+  EXPECT_EQ(diagnose(seen).cause, Cause::kLocked);
+  EXPECT_TRUE(sentence(diagnose(seen)).starts_with("locked: offset "));
+}
+
+TEST(PortDiagnosis, a_second_transmitter_is_remarked_on) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  ASSERT_EQ(diagnose_all(seen).size(), 1U);
+  auto other = message(ptp::Announce{});
+  other[20] = 0xEE;  // of its identity
+  seen.at_port.on_message(other, Way::kUdpIpv4);
+  const auto all = diagnose_all(seen);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[1].cause, Cause::kTwoTransmitters);
+}
+
+TEST(PortDiagnosis, names_are_different_and_there_is_one_for_each_cause) {
+  std::set<std::string_view> names;
+  for (std::size_t i = 0; i < kCauses; ++i) names.insert(name(static_cast<Cause>(i)));
+  EXPECT_EQ(names.size(), kCauses);
+  EXPECT_FALSE(names.contains(""));
+}
+
+}  // namespace
+}  // namespace ftcs::diagnosis
