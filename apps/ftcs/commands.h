@@ -16,6 +16,7 @@ using enum daemon::ExitCode;
 void add_analyse_command(CLI::App& app, int& exit_code);
 void add_compare_command(CLI::App& app, int& exit_code);
 void add_demo_command(CLI::App& app, int& exit_code);
+void add_doctor_command(CLI::App& app, int& exit_code);
 void add_ethercat_command(CLI::App& app, int& exit_code);
 void add_ethercat_segment_command(CLI::App& app, int& exit_code);
 void add_manual_command(CLI::App& app, int& exit_code);

@@ -47,6 +47,7 @@ int run(int argc, char** argv) {
   add_analyse_command(app, exit_code);
   add_demo_command(app, exit_code);
   add_compare_command(app, exit_code);
+  add_doctor_command(app, exit_code);
   add_ethercat_command(app, exit_code);
   add_ethercat_segment_command(app, exit_code);
   add_manual_command(app, exit_code);

@@ -11,6 +11,7 @@
 
 #include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/steering_arguments.h"
+#include "ftcs/daemon/ptp_options.h"
 
 namespace ftcs::app {
 
@@ -51,5 +52,9 @@ struct PtpArguments {
 /// The flags of `ftcs ptp`: ptp4l's, our own, and every setting of ptp4l's configuration file.
 /// `arguments` must outlive `command`.
 void add_ptp_arguments(CLI::App& command, PtpArguments& arguments);
+
+/// The options that those arguments ask for. Returns what is wrong with them, or nothing.
+[[nodiscard]] std::optional<std::string> make_ptp_options(const PtpArguments& arguments,
+                                                          daemon::PtpOptions& options);
 
 }  // namespace ftcs::app

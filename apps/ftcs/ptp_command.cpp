@@ -200,7 +200,10 @@ Wrong apply_role(const PtpArguments& arguments, daemon::PtpOptions& options) {
   return std::nullopt;
 }
 
-Wrong make_options(const PtpArguments& arguments, daemon::PtpOptions& options) {
+}  // namespace
+
+std::optional<std::string> make_ptp_options(const PtpArguments& arguments,
+                                            daemon::PtpOptions& options) {
   if (!arguments.preset.empty()) {
     if (auto wrong = apply_preset(options, arguments.preset)) return "--preset: " + *wrong;
   }
@@ -217,8 +220,6 @@ Wrong make_options(const PtpArguments& arguments, daemon::PtpOptions& options) {
   return std::nullopt;
 }
 
-}  // namespace
-
 void add_ptp_command(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("ptp", "follow a PTP time transmitter, or be one (flags as ptp4l's)");
@@ -226,7 +227,7 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
   add_ptp_arguments(*command, *arguments);
   command->callback([arguments, &exit_code] {
     daemon::PtpOptions options;
-    if (const auto wrong = make_options(*arguments, options)) {
+    if (const auto wrong = make_ptp_options(*arguments, options)) {
       fmt::print(stderr, "ftcs ptp: {}\n", *wrong);
       exit_code = kUsageError;
       return;

@@ -73,18 +73,29 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
   }
   watch_for_silence(now);
   log_lock();
-  service().turn(now, follower_.locked(), [this] { return service_sentence(); });
+  service().turn(now, follower_.locked(), [this] { return diagnosis::sentence(finding()); });
 }
 
-std::string MonitorReceiver::service_sentence() const {
-  if (!source_.transmitter()) {
-    return fmt::format("not locked: no timestamps of a ptp4l on {}", options().monitor_socket);
+diagnosis::Finding MonitorReceiver::finding() const {
+  using diagnosis::Cause;
+  if (!source_.transmitter() || silent_) {
+    return {Cause::kNoAnnounce,
+            fmt::format("no timestamps of a ptp4l come to {}", options().monitor_socket),
+            "a ptp4l in the state SLAVE or UNCALIBRATED",
+            fmt::format("'slave_event_monitor {}' and 'free_running 1' in its configuration",
+                        options().monitor_socket)};
   }
   const Telemetry& seen = follower_.discipline().latest();
-  if (!seen.servo.offset_known) return "not locked: ptp4l reports, the path delay is not known yet";
-  return fmt::format("{}: offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
-                     follower_.locked() ? "locked" : "not locked", seen.servo.offset.ns(),
-                     seen.servo.path_delay.ns(), seen.tracking_rate.ppb());
+  if (delays_missing_ && !seen.servo.offset_known) {
+    return {Cause::kNoDelayResp, "ptp4l reports Syncs but no delays", "a delay now and then",
+            "-P if it measures peer to peer, or start ftcs after it"};
+  }
+  if (!seen.servo.offset_known)
+    return {Cause::kAcquiring, "ptp4l reports, the path delay is not known yet", "", ""};
+  return {follower_.locked() ? Cause::kLocked : Cause::kAcquiring,
+          fmt::format("offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
+                      seen.servo.offset.ns(), seen.servo.path_delay.ns(), seen.tracking_rate.ppb()),
+          "", ""};
 }
 
 // Before the next sample, which would be seconds off. The clock is never stepped for it.
@@ -224,7 +235,7 @@ ptp::ManagedPort MonitorReceiver::managed_port() {
 
 std::string MonitorReceiver::status(const ptp::ManagementCounters& management) {
   const StatusOfPort port{options(), facts_, seconds_since_start(), management};
-  return monitor_status(port, source_, state(), follower_.record(), now());
+  return monitor_status(port, source_, state(), follower_.record(), finding(), now());
 }
 
 bool complete_by_ptp4l(PtpOptions& options, Log& log) {

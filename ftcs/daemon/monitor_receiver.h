@@ -8,6 +8,7 @@
 #include "ftcs/daemon/clock_follower.h"
 #include "ftcs/daemon/management_client.h"
 #include "ftcs/daemon/ptp_port.h"
+#include "ftcs/diagnosis/finding.h"
 #include "ftcs/platform/local_socket.h"
 #include "ftcs/ptp/monitor_source.h"
 
@@ -48,7 +49,7 @@ class MonitorReceiver final : public PtpPort, private Managed {
   void on_sample(const ptp::MonitorSample& sample);
   void watch_for_silence(FreeRunningTime now);
   void log_lock();
-  [[nodiscard]] std::string service_sentence() const;
+  [[nodiscard]] diagnosis::Finding finding() const;
   [[nodiscard]] ptp::PortState state() const;
 
   PortFacts facts_;

@@ -45,7 +45,8 @@ int PtpPort::run() {
 int PtpPort::run(const std::function<bool()>& stop) {
   for (const std::string& note : options_.notes) log_(LogLevel::kNotice, "{}", note);
   if (const auto error = open_source()) {
-    log_(LogLevel::kError, "{}", error->message());
+    fail(error->message());
+    log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
   }
   if (!open_management() || !open_feed()) return kRuntimeError;

@@ -49,6 +49,8 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] int run(const std::function<bool()>& stop);
   /// The service manager hears of somebody else whether this program is ready.
   void silence_service() { service_.emplace(platform::ServiceManager("")); }
+  /// Why the run ended early; none: it did not.
+  [[nodiscard]] const std::optional<std::string>& failure() const { return failure_; }
 
  protected:
   // What comes in. Event stamps and `now` are on the free-running oscillator.

@@ -46,6 +46,7 @@ PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Lo
             clock(), gate()),
       record_(this->options(), log, state_, node_.discipline(), now(),
               "port 1 (" + options.interface + ")"),
+      observer_(this->options(), facts.identity.clock, now()),
       facts_(facts) {
   start_at_known_rate(state_, node_, log, "port 1 (" + options.interface + ")");
 }
@@ -59,11 +60,13 @@ void PtpReceiver::start(FreeRunningTime now) {
 
 void PtpReceiver::on_event(std::span<const std::uint8_t> bytes, FreeRunningTime received,
                            FreeRunningTime now) {
+  observer_.on_message(bytes);
   node_.on_event_message(bytes, received, now);
   take_events(now);
 }
 
 void PtpReceiver::on_general(std::span<const std::uint8_t> bytes, FreeRunningTime now) {
+  observer_.on_message(bytes);
   node_.on_general_message(bytes, now);
   take_events(now);
 }
@@ -132,13 +135,13 @@ void PtpReceiver::on_selected(const ptp::TransmitterSelected& selected) {
   if ((selected.transmitter.flags & ptp::flag::kPtpTimescale) == 0) {
     log()(LogLevel::kNotice, "foreign master not using PTP timescale");
   }
-  had_transmitter_ = true;
 }
 
 void PtpReceiver::housekeeping(FreeRunningTime now) {
   node_.on_silence(now);
   take_events(now);
   record_.follow_lock(now);
+  observer_.turn(now, totals());
   service().turn(now, node_.locked(), [this] { return service_sentence(); });
   if (real_clock() != nullptr) {
     const ClockDiscipline& discipline = node_.discipline();
@@ -153,21 +156,45 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   if (!looked_for_missing_ &&
       seconds_since_start() > kPatienceInAnnounces * std::exp2(options().log_announce_interval)) {
     looked_for_missing_ = true;
-    if (log_missing(LogLevel::kWarning)) log_unusual(node_.port().counters());
+    if (node_.locked() || node_.discipline().path_delay_known()) return;
+    log_findings(LogLevel::kWarning);
+    log_unusual(node_.port().counters());
   }
 }
 
-std::string PtpReceiver::service_sentence() const {
-  if (!had_transmitter_) {
-    return fmt::format("not locked: no time transmitter was heard on {}, domain {}",
-                       options().interface, options().domain);
+std::string PtpReceiver::service_sentence() {
+  return diagnosis::sentence(diagnosis::diagnose(seen()));
+}
+
+PortTotals PtpReceiver::totals() {
+  PortTotals totals;
+  totals.counters = node_.port().counters();
+  if (const platform::PtpSocket* socket = transport().socket()) {
+    totals.receive_stamps_missing = socket->counters().receive_stamp_missing;
+    totals.unicast_dropped = socket->counters().unicast_dropped;
   }
-  const ServoSnapshot& seen = node_.discipline().latest().servo;
-  if (!seen.offset_known)
-    return "not locked: a time transmitter announces, the path delay is not known yet";
-  return fmt::format("{}: offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
-                     node_.locked() ? "locked" : "not locked", seen.offset.ns(),
-                     seen.path_delay.ns(), node_.discipline().latest().tracking_rate.ppb());
+  totals.foreign_steps = timestamps().foreign_steps();
+  totals.samples = node_.discipline().counters();
+  return totals;
+}
+
+diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
+  diagnosis::PortSeen seen = observer_.seen(now, totals());
+  seen.link_up = transport().is_up();
+  seen.has_transmitter = node_.port().transmitter() != nullptr;
+  seen.peer_delay = node_.port().peer_delay().mean_link_delay();
+  seen.locked = node_.locked();
+  seen.path_delay_known = node_.discipline().path_delay_known();
+  seen.servo = node_.discipline().latest().servo;
+  seen.rate = node_.discipline().latest().tracking_rate;
+  if (real_clock() != nullptr) seen.refusal = real_clock()->refusal().value_or("");
+  return seen;
+}
+
+void PtpReceiver::log_findings(LogLevel level) {
+  for (const diagnosis::Finding& finding : diagnosis::diagnose_all(seen(now()))) {
+    log()(level, "{}", diagnosis::sentence(finding));
+  }
 }
 
 // Before the next sample, which would be seconds off. The clock is never stepped for it.
@@ -175,31 +202,9 @@ void PtpReceiver::follow_scale_change() {
   if (real_clock() != nullptr && real_clock()->take_scale_change()) node_.on_new_reference();
 }
 
-bool PtpReceiver::log_missing(LogLevel level) {
-  if (!had_transmitter_) {
-    log()(level, "no time transmitter was found: domain {}, {}, transportSpecific {}",
-          options().domain, platform::name(options().socket.transport), options().major_sdo_id);
-  }
-  const bool no_peer = options().peer_to_peer() && !node_.port().peer_delay().mean_link_delay();
-  if (no_peer) {
-    log()(level, "no peer delay: the neighbour answers no Pdelay_Req (-E needs none)");
-  }
-  const ptp::Counters& counted = node_.port().counters();
-  const bool no_answer =
-      !options().peer_to_peer() && had_transmitter_ && !node_.discipline().path_delay_known();
-  if (no_answer) {
-    log()(level,
-          "no path delay was measured: {} Delay_Req sent, {} answered, {} without a transmit "
-          "timestamp; not locked, as the offset may be off by the length of the path",
-          counted[ptp::Counter::kDelayReqSent], counted[ptp::Counter::kDelayRespReceived],
-          counted[ptp::Counter::kMissingTransmitStamp]);
-  }
-  return !had_transmitter_ || no_peer || no_answer;
-}
-
 int PtpReceiver::finish() {
   record_.log_summary();
-  (void)log_missing(LogLevel::kNotice);
+  if (!node_.locked()) log_findings(LogLevel::kNotice);
   log_peer_delay(node_.port().peer_delay());
   log_unusual(node_.port().counters());
   return node_.locked() ? kSuccess : kNotLocked;
@@ -211,7 +216,7 @@ ptp::ManagedPort PtpReceiver::managed_port() {
 
 std::string PtpReceiver::status(const ptp::ManagementCounters& management) {
   const StatusOfPort port{options(), facts_, seconds_since_start(), management};
-  return receiver_status(port, node_.port(), record_, now());
+  return receiver_status(port, node_.port(), record_, seen(now()), now());
 }
 
 }  // namespace ftcs::daemon

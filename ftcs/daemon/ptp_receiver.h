@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "ftcs/daemon/follower_record.h"
+#include "ftcs/daemon/port_observer.h"
 #include "ftcs/daemon/ptp_port.h"
 #include "ftcs/node/receiver_node.h"
 
@@ -24,11 +25,14 @@ class PtpReceiver : public PtpPort, private Managed {
               std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
               RealClock* real_clock);
 
+  /// What has come of it lately, for a diagnosis.
+  [[nodiscard]] diagnosis::PortSeen seen() { return seen(now()); }
+
  protected:
   void housekeeping(FreeRunningTime now) override;
   [[nodiscard]] const node::ReceiverNode& node() const { return node_; }
   /// What the port does, or what it waits for.
-  [[nodiscard]] std::string service_sentence() const;
+  [[nodiscard]] std::string service_sentence();
 
  private:
   void start(FreeRunningTime now) override;
@@ -51,14 +55,14 @@ class PtpReceiver : public PtpPort, private Managed {
   void take(const node::ReceiverEvent& event, FreeRunningTime now);
   void tell(const ptp::Action& action);
   void on_selected(const ptp::TransmitterSelected& selected);
+  [[nodiscard]] PortTotals totals();
+  [[nodiscard]] diagnosis::PortSeen seen(FreeRunningTime now);
+  void log_findings(LogLevel level);
   void follow_scale_change();
-  /// True if there was something to say.
-  bool log_missing(LogLevel level);
-
   StateKeeper state_;
   node::ReceiverNode node_;
   FollowerRecord record_;
-  bool had_transmitter_ = false;
+  PortObserver observer_;
   bool looked_for_missing_ = false;
   PortFacts facts_;
 };

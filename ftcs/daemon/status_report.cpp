@@ -41,6 +41,14 @@ Json to_json(const ptp::ManagementCounters& counters) {
           {"malformed", counters.malformed}};
 }
 
+Json to_json(const diagnosis::Finding& finding) {
+  return {{"cause", std::string(diagnosis::name(finding.cause))},
+          {"sentence", diagnosis::sentence(finding)},
+          {"seen", finding.seen},
+          {"expected", finding.expected},
+          {"remedy", finding.remedy}};
+}
+
 Json to_json(const std::deque<FollowerRecord::Refusal>& refusals) {
   Json list = Json::array();
   for (const auto& refusal : refusals) {
@@ -115,6 +123,10 @@ void add_refusals(std::string& text, const Json& status) {
 
 void add_follower_lines(std::string& text, const Json& status) {
   add_line(text, "locked", locked_text(status));
+  const auto found = status.find("diagnosis");
+  if (found != status.end() && found->is_object()) {
+    add_line(text, "in a sentence", word(*found, "sentence"));
+  }
   add_line(text, "state", word(status, "state"));
   add_line(text, "offset",
            fmt::format("{} +/- {}", time_text(status, "offset_ns"),
@@ -225,20 +237,23 @@ int exit_code_of(const Json& status) {
 }  // namespace
 
 std::string receiver_status(const StatusOfPort& port, const ptp::TimeReceiver& core,
-                            const FollowerRecord& record, FreeRunningTime now) {
+                            const FollowerRecord& record, const diagnosis::PortSeen& seen,
+                            FreeRunningTime now) {
   Json status = common(port, core.state(), core.counters());
   add_transmitter(status, core.transmitter());
   add_follower(status, record, now);
+  status["diagnosis"] = to_json(diagnosis::diagnose(seen));
   return dump(status);
 }
 
 std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& source,
                            ptp::PortState state, const FollowerRecord& record,
-                           FreeRunningTime now) {
+                           const diagnosis::Finding& finding, FreeRunningTime now) {
   Json status = common(port, state, ptp::Counters{});
   const auto& transmitter = source.transmitter();
   status["transmitter"] = transmitter ? Json(std::string(to_text(*transmitter).view())) : Json();
   add_follower(status, record, now);
+  status["diagnosis"] = to_json(finding);
   const ptp::MonitorCounters& counters = source.counters();
   status["messages"] = {{"syncs", counters.syncs},
                         {"delays", counters.delays},

@@ -8,6 +8,7 @@
 #include "ftcs/daemon/follower_record.h"
 #include "ftcs/daemon/port_data_sets.h"
 #include "ftcs/daemon/ptp_options.h"
+#include "ftcs/diagnosis/port_diagnosis.h"
 #include "ftcs/ptp/management_responder.h"
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/ptp/time_transmitter.h"
@@ -25,13 +26,14 @@ struct StatusOfPort {
 // The status as one JSON object; docs/beside-your-tools.md lists the fields. Units end their names;
 // what is not known is null.
 [[nodiscard]] std::string receiver_status(const StatusOfPort& port, const ptp::TimeReceiver& core,
-                                          const FollowerRecord& record, FreeRunningTime now);
+                                          const FollowerRecord& record,
+                                          const diagnosis::PortSeen& seen, FreeRunningTime now);
 [[nodiscard]] std::string transmitter_status(const StatusOfPort& port,
                                              const ptp::TimeTransmitter& core);
 
 [[nodiscard]] std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& source,
                                          ptp::PortState state, const FollowerRecord& record,
-                                         FreeRunningTime now);
+                                         const diagnosis::Finding& finding, FreeRunningTime now);
 
 /// The same for people, as lines "name  value".
 struct StatusForPeople {

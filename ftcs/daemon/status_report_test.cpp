@@ -62,13 +62,18 @@ TEST(StatusReport, ATimeReceiverThatHearsNobodyKnowsNoOffset) {
   ptp::TimeReceiver core({});
   const PortFacts facts{};
   const ptp::ManagementCounters management{};
-  const auto json =
-      receiver_status({options, facts, 1.0, management}, core, follower.record(), source.now());
+  diagnosis::PortSeen seen;
+  seen.settings.interface = "eth0";
+  const auto json = receiver_status({options, facts, 1.0, management}, core, follower.record(),
+                                    seen, source.now());
   EXPECT_NE(json.find("\"offset_ns\": null"), std::string::npos) << json;
   EXPECT_NE(json.find("\"transmitter\": null"), std::string::npos);
   const auto status = read_status(json);
   ASSERT_TRUE(status.has_value());
   EXPECT_EQ(status->exit_code, kNotLocked);
+  EXPECT_NE(status->text.find("in a sentence   not locked: no time transmitter was heard on eth0"),
+            std::string::npos)
+      << status->text;
 
   const auto sets = data_sets(options, facts, core, follower.record(), source.now());
   EXPECT_EQ(sets.current, ptp::CurrentDataSet{});
@@ -99,8 +104,10 @@ TEST(StatusReport, PeerToPeerThePathDelayIsThatOfTheLink) {
   const ptp::MonitorSource reports;
   const PortFacts facts{};
   const ptp::ManagementCounters management{};
-  const auto json = monitor_status({options, facts, 1.0, management}, reports,
-                                   ptp::PortState::kTimeReceiver, follower.record(), source.now());
+  const auto json = monitor_status(
+      {options, facts, 1.0, management}, reports, ptp::PortState::kTimeReceiver, follower.record(),
+      {diagnosis::Cause::kLocked, "offset 3 ns", "", ""}, source.now());
+  EXPECT_NE(json.find("\"cause\": \"locked\""), std::string::npos) << json;
   EXPECT_NE(json.find("\"path_delay_ns\": 1500.0"), std::string::npos) << json;
 }
 

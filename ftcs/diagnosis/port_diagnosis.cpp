@@ -21,41 +21,30 @@ Finding acquiring(const PortSeen& seen) {
   return {Cause::kAcquiring, figures(seen), "", ""};
 }
 
-/// What keeps nobody from locking, and is worth a word.
-std::vector<Finding> remarks(const PortSeen& seen) {
-  std::vector<Finding> found;
-  const Talkers& talkers = seen.on_wire ? *seen.on_wire : seen.at_port;
-  std::string names;
-  std::size_t announcers = 0;
-  for (const Talker& talker : talkers.all()) {
-    if (!is_for(talker, seen.settings) || !talker.announces()) continue;
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", to_text(talker.port).view());
-    ++announcers;
-  }
-  if (announcers > 1) {
-    found.push_back({Cause::kTwoTransmitters,
-                     fmt::format("{} ports announce in this domain: {}", announcers, names),
-                     "the best of them alone announces, once the others have heard it",
-                     "transmitters that do not hear each other may disagree"});
-  }
-  return found;
-}
-
 }  // namespace
 
 std::vector<Finding> diagnose_all(const PortSeen& seen) {
-  if (seen.locked) {
-    std::vector<Finding> all{{Cause::kLocked, figures(seen), "", ""}};
-    for (Finding& remark : remarks(seen)) all.push_back(std::move(remark));
-    return all;
-  }
   std::vector<Finding> all;
-  const auto rules = seen.has_transmitter ? rules_of_measuring() : rules_of_hearing();
-  for (const PortRule rule : rules) {
-    if (auto found = rule(seen)) all.push_back(std::move(*found));
+  const auto add = [&all](std::vector<Finding> more) {
+    for (Finding& finding : more) all.push_back(std::move(finding));
+  };
+  if (auto found = other_group(seen)) all.push_back(std::move(*found));
+  // A real clock does not follow what a virtual one may.
+  if (seen.steers_real_clock) add(refusals_of_time(seen));
+  if (seen.locked) {
+    if (all.empty()) all.push_back({Cause::kLocked, figures(seen), "", ""});
+  } else {
+    const auto rules = seen.has_transmitter ? rules_of_measuring() : rules_of_hearing();
+    for (const PortRule rule : rules) {
+      if (auto found = rule(seen)) all.push_back(std::move(*found));
+    }
+    if (all.empty()) all.push_back(seen.has_transmitter ? acquiring(seen) : nothing_heard(seen));
   }
-  if (all.empty()) all.push_back(seen.has_transmitter ? acquiring(seen) : nothing_heard(seen));
-  for (Finding& remark : remarks(seen)) all.push_back(std::move(remark));
+  if (all.front().cause == Cause::kNoAnnounce) {
+    if (auto found = no_peer(seen)) all.push_back(std::move(*found));
+  }
+  if (!seen.steers_real_clock) add(refusals_of_time(seen));
+  add(remarks(seen));
   return all;
 }
 

@@ -47,8 +47,10 @@ struct PortSeen {
   bool path_delay_known = false;
   ServoSnapshot servo{};
   Rate rate{};
-  DisciplineCounters samples{};  ///< lately
-  std::string refusal{};         ///< why the reference's time is not believed; empty: it is
+  DisciplineCounters samples{};         ///< lately
+  bool steers_real_clock = false;       ///< one would be, were this not a trial
+  std::optional<std::int64_t> utc_s{};  ///< by the system clock, where it is to be compared
+  std::string refusal{};                ///< why the reference's time is not believed; empty: it is
 };
 
 /// The first thing that stands between the port and its lock, in the order in which things must be

@@ -206,16 +206,44 @@ TEST(PortDiagnosis, a_locked_port_says_so_whatever_else_was_counted) {
   EXPECT_TRUE(sentence(diagnose(seen)).starts_with("locked: offset "));
 }
 
+std::vector<std::uint8_t> frame(const std::vector<std::uint8_t>& message) {
+  std::vector<std::uint8_t> octets{0x01, 0x80, 0xC2, 0, 0, 0x0E, 2, 2, 2, 2, 2, 2, 0x88, 0xF7};
+  octets.insert(octets.end(), message.begin(), message.end());
+  return octets;
+}
+
+TEST(PortDiagnosis, what_only_a_listener_to_the_whole_wire_hears_is_no_lock) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  seen.settings.way = Way::kEthernet;
+  seen.settings.group = {0x01, 0x1B, 0x19, 0, 0, 0};
+  seen.on_wire.emplace();
+  seen.on_wire->on_frame(frame(message(ptp::Announce{})));
+  EXPECT_EQ(diagnose(seen).cause, Cause::kGroup);
+  EXPECT_NE(sentence(diagnose(seen)).find("--ptp_dst_mac 01:80:C2:00:00:0E"), std::string::npos);
+}
+
+TEST(PortDiagnosis, times_that_a_real_clock_would_not_follow_are_remarks_for_a_virtual_one) {
+  for (const bool real : {false, true}) {
+    PortSeen seen = followed();
+    seen.locked = true;
+    seen.steers_real_clock = real;
+    const auto all = diagnose_all(seen);  // the Announce has no flag of the PTP timescale
+    ASSERT_EQ(all.size(), real ? 1U : 2U);
+    EXPECT_EQ(all.back().cause, Cause::kTimescale);
+    EXPECT_EQ(all.front().cause, real ? Cause::kTimescale : Cause::kLocked);
+  }
+}
+
 TEST(PortDiagnosis, a_second_transmitter_is_remarked_on) {
   PortSeen seen = followed();
   seen.locked = true;
-  ASSERT_EQ(diagnose_all(seen).size(), 1U);
+  ASSERT_EQ(diagnose_all(seen).back().cause, Cause::kTimescale);
   auto other = message(ptp::Announce{});
   other[20] = 0xEE;  // of its identity
   seen.at_port.on_message(other, Way::kUdpIpv4);
   const auto all = diagnose_all(seen);
-  ASSERT_EQ(all.size(), 2U);
-  EXPECT_EQ(all[1].cause, Cause::kTwoTransmitters);
+  EXPECT_EQ(all.back().cause, Cause::kTwoTransmitters);
 }
 
 TEST(PortDiagnosis, names_are_different_and_there_is_one_for_each_cause) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "ftcs/diagnosis/port_diagnosis.h"
 
@@ -14,9 +15,19 @@ using PortRule = std::optional<Finding> (*)(const PortSeen& seen);
 
 /// While no transmitter is selected, in order; nothing_heard() is what is left.
 [[nodiscard]] std::span<const PortRule> rules_of_hearing() noexcept;
+/// IEEE 802.3: all are for another group address. Who listens to the whole wire hears them, a port
+/// by itself does not, on most adapters.
+[[nodiscard]] std::optional<Finding> other_group(const PortSeen& seen);
 [[nodiscard]] Finding nothing_heard(const PortSeen& seen);
 /// While one is, in order.
 [[nodiscard]] std::span<const PortRule> rules_of_measuring() noexcept;
+
+/// Times that a real clock does not follow; a virtual one does.
+[[nodiscard]] std::vector<Finding> refusals_of_time(const PortSeen& seen);
+/// What keeps nobody from locking, and is worth a word.
+[[nodiscard]] std::vector<Finding> remarks(const PortSeen& seen);
+/// The neighbour of a port that measures peer to peer does not answer.
+[[nodiscard]] std::optional<Finding> no_peer(const PortSeen& seen);
 
 [[nodiscard]] std::string name(Way way);
 /// The flag that chooses it: -4, -6 or -2.

@@ -145,20 +145,6 @@ Found version(const PortSeen& seen) {
       "the transmitter's own settings: the two versions do not understand each other"};
 }
 
-Found group(const PortSeen& seen) {
-  const PortSettings& settings = seen.settings;
-  if (settings.way != Way::kEthernet || !seen.on_wire) return std::nullopt;
-  const Talker* const one = transmitter(seen, [&](const Talker& talker) {
-    return is_for(talker, settings) && talker.to_group && talker.destination != settings.group &&
-           talker.destination != std::array<std::uint8_t, 6>{};
-  });
-  if (one == nullptr) return std::nullopt;
-  const std::string group = fmt::format("{:02X}", fmt::join(one->destination, ":"));
-  return Finding{Cause::kGroup, fmt::format("{} sends to the group {}", who(*one), group),
-                 fmt::format("the group {:02X}", fmt::join(settings.group, ":")),
-                 "--ptp_dst_mac " + group};
-}
-
 Found unicast(const PortSeen& seen) {
   const bool on_wire = transmitter(seen, [&](const Talker& talker) {
                          return is_for(talker, seen.settings) && !talker.to_group;
@@ -246,8 +232,8 @@ Found no_announce(const PortSeen& seen) {
   const PortSettings& settings = seen.settings;
   return Finding{
       Cause::kNoAnnounce,
-      fmt::format("no time transmitter was heard on {}, domain {}, {}", settings.interface,
-                  settings.domain, name(settings.way)),
+      fmt::format("no time transmitter was heard on {}, domain {}, {}, transportSpecific {}",
+                  settings.interface, settings.domain, name(settings.way), settings.major_sdo_id),
       "an Announce every second or two",
       seen.on_wire
           ? std::string("nothing of PTP is on this wire: the transmitter is off, on another "
@@ -273,25 +259,31 @@ bool is_for(const Talker& talker, const PortSettings& settings) noexcept {
 }
 
 std::span<const PortRule> rules_of_hearing() noexcept {
-  static constexpr std::array<PortRule, 16> kRules{
-      link_down,
-      not_acceptable,
-      not_capable,
-      unusable_announce,
-      alternate,
-      group,
-      unicast,
-      not_delivered,
-      sync_without_announce,
-      domain,
-      sdo,
-      transport,
-      vlan,
-      version,
-      malformed,
+  static constexpr std::array<PortRule, 15> kRules{
+      link_down,      not_acceptable,
+      not_capable,    unusable_announce,
+      alternate,      unicast,
+      not_delivered,  sync_without_announce,
+      domain,         sdo,
+      transport,      vlan,
+      version,        malformed,
       only_receivers,
   };
   return kRules;
+}
+
+std::optional<Finding> other_group(const PortSeen& seen) {
+  const PortSettings& settings = seen.settings;
+  if (settings.way != Way::kEthernet || !seen.on_wire) return std::nullopt;
+  const Talker* const one = transmitter(seen, [&](const Talker& talker) {
+    return is_for(talker, settings) && talker.to_group && talker.destination != settings.group &&
+           talker.destination != std::array<std::uint8_t, 6>{};
+  });
+  if (one == nullptr) return std::nullopt;
+  const std::string group = fmt::format("{:02X}", fmt::join(one->destination, ":"));
+  return Finding{Cause::kGroup, fmt::format("{} sends to the group {}", who(*one), group),
+                 fmt::format("the group {:02X}", fmt::join(settings.group, ":")),
+                 "--ptp_dst_mac " + group};
 }
 
 Finding nothing_heard(const PortSeen& seen) { return *no_announce(seen); }

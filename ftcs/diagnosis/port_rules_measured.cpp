@@ -95,30 +95,12 @@ Found timescale(const PortSeen& seen) {
   return Finding{Cause::kTimescale, seen.refusal, "", ""};
 }
 
-Found no_peer(const PortSeen& seen) {
-  if (!seen.settings.peer_to_peer || seen.peer_delay) return std::nullopt;
-  if (seen.counters[Counter::kMissingTransmitStamp] > 0 &&
-      seen.counters[Counter::kPdelayRespReceived] > 0) {
-    return std::nullopt;
-  }
-  if (seen.counters[Counter::kSeveralResponders] > 0) {
-    return Finding{Cause::kSeveralPeers, "two ports answer one Pdelay_Req",
-                   "a cable between two ports, or a switch that measures peer to peer",
-                   "-E measures through switches"};
-  }
-  return Finding{Cause::kNoPeer,
-                 fmt::format("no peer delay: the neighbour answers no Pdelay_Req ({} sent)",
-                             seen.counters[Counter::kPdelayReqSent]),
-                 "a Pdelay_Resp to each", "-E, as the transmitter seems to measure end to end"};
-}
-
 Found no_transmit_stamps(const PortSeen& seen) {
   const std::uint64_t missing = seen.counters[Counter::kMissingTransmitStamp];
   if (seen.path_delay_known || missing == 0) return std::nullopt;
   return Finding{
       Cause::kNoTransmitStamps,
-      fmt::format("{} requests left without a transmit timestamp, and the path delay is "
-                  "not known",
+      fmt::format("no path delay was measured: {} requests left without a transmit timestamp",
                   missing),
       "a timestamp within tx_timestamp_timeout",
       "--tx_timestamp_timeout 100 waits longer; -S takes software timestamps; ethtool -T " +
@@ -179,6 +161,23 @@ Found samples_refused(const PortSeen& seen) {
 }
 
 }  // namespace
+
+std::optional<Finding> no_peer(const PortSeen& seen) {
+  if (!seen.settings.peer_to_peer || seen.peer_delay) return std::nullopt;
+  if (seen.counters[Counter::kMissingTransmitStamp] > 0 &&
+      seen.counters[Counter::kPdelayRespReceived] > 0) {
+    return std::nullopt;
+  }
+  if (seen.counters[Counter::kSeveralResponders] > 0) {
+    return Finding{Cause::kSeveralPeers, "two ports answer one Pdelay_Req",
+                   "a cable between two ports, or a switch that measures peer to peer",
+                   "-E measures through switches"};
+  }
+  return Finding{Cause::kNoPeer,
+                 fmt::format("no peer delay: the neighbour answers no Pdelay_Req ({} sent)",
+                             seen.counters[Counter::kPdelayReqSent]),
+                 "a Pdelay_Resp to each", "-E, as the transmitter seems to measure end to end"};
+}
 
 std::span<const PortRule> rules_of_measuring() noexcept {
   static constexpr std::array<PortRule, 11> kRules{

@@ -26,6 +26,15 @@ std::uint16_t word(Bytes bytes, std::size_t at) noexcept {
   return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
 }
 
+/// Of the Timestamp behind the header (5.3.3): 48 bits of seconds.
+std::optional<std::int64_t> seconds_of(Bytes message) noexcept {
+  constexpr std::size_t kSize = 6;
+  if (message.size() < kHeader + kSize) return std::nullopt;
+  std::int64_t seconds = 0;
+  for (std::size_t i = 0; i < kSize; ++i) seconds = seconds << 8 | message[kHeader + i];
+  return seconds;
+}
+
 /// What UDP carries, if it is for PTP's ports.
 Bytes ptp_of_udp(Bytes datagram) noexcept {
   if (datagram.size() < kUdpHeader) return {};
@@ -99,13 +108,22 @@ void Talkers::note(Bytes message, Talker kind) noexcept {
   if (talker == nullptr) return;
   ++talker->messages[type];
   const std::uint16_t flags = word(message, 6);
-  if (static_cast<ptp::MessageType>(type) == ptp::MessageType::kSync) {
-    talker->two_step = (flags & ptp::flag::kTwoStep) != 0;
-  } else if (static_cast<ptp::MessageType>(type) == ptp::MessageType::kAnnounce) {
-    talker->announce_flags = flags;
-    if (message.size() >= kUtcOffsetAt + 2) {
-      talker->utc_offset = static_cast<std::int16_t>(word(message, kUtcOffsetAt));
-    }
+  switch (static_cast<ptp::MessageType>(type)) {
+    case ptp::MessageType::kSync:
+      talker->two_step = (flags & ptp::flag::kTwoStep) != 0;
+      if (!talker->two_step) talker->shown_s = seconds_of(message);
+      break;
+    case ptp::MessageType::kFollowUp:
+      talker->shown_s = seconds_of(message);
+      break;
+    case ptp::MessageType::kAnnounce:
+      talker->announce_flags = flags;
+      if (message.size() >= kUtcOffsetAt + 2) {
+        talker->utc_offset = static_cast<std::int16_t>(word(message, kUtcOffsetAt));
+      }
+      break;
+    default:
+      break;
   }
 }
 

@@ -30,6 +30,8 @@ struct Talker {
   bool two_step = false;                      ///< the flag of its last Sync
   std::uint16_t announce_flags = 0;           ///< of its last Announce
   std::int16_t utc_offset = 0;                ///< likewise
+  /// What its last one-step Sync or Follow_Up showed, whole seconds since its epoch; none: nothing.
+  std::optional<std::int64_t> shown_s{};
 
   [[nodiscard]] std::uint32_t count(ptp::MessageType type) const noexcept {
     return messages[static_cast<std::size_t>(type)];
@@ -48,6 +50,8 @@ class Talkers {
 
   /// Whose messages are our own.
   void set_own(const ptp::ClockIdentity& own) noexcept { own_ = own; }
+  /// Forgets whom it heard.
+  void clear() noexcept { size_ = 0; }
   /// A message as it came to a socket.
   void on_message(std::span<const std::uint8_t> message, Way way) noexcept;
   /// An Ethernet frame, tags included; other than PTP is ignored.
