@@ -28,7 +28,7 @@ PtpOptions plant_options(PtpOptions options) {
 
 }  // namespace
 
-std::string PlantReceiver::objection(ReferenceTime plant) const {
+std::string PlantReceiver::objection(ReferenceTime plant) {
   if (!node().locked()) return service_sentence();
   if (plant >= ReferenceTime{}) return {};
   return fmt::format(

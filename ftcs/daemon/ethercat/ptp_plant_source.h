@@ -27,7 +27,7 @@ class PlantReceiver final : public PtpReceiver {
  private:
   void housekeeping(FreeRunningTime now) override;
   /// Empty: nothing speaks against it.
-  [[nodiscard]] std::string objection(ReferenceTime plant) const;
+  [[nodiscard]] std::string objection(ReferenceTime plant);
 
   void warn_of_timescale();
 
