@@ -2,7 +2,6 @@
 #include "ftcs/daemon/doctor.h"
 
 #include <atomic>
-#include <sys/socket.h>
 #include <thread>
 #include <utility>
 
@@ -72,8 +71,7 @@ diagnosis::Finding failure(std::string text) {
 }
 
 bool is_link_up(platform::Kernel& kernel, const std::string& interface) {
-  const platform::Descriptor socket(kernel, kernel.socket(AF_INET, SOCK_DGRAM));
-  const auto state = platform::interface_state(kernel, socket.get(), interface);
+  const auto state = platform::interface_state(kernel, interface);
   return !state || (state->up && state->running);
 }
 

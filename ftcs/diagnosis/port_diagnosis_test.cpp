@@ -99,7 +99,11 @@ std::vector<Case> heard() {
       {Cause::kOnlyReceivers,
        with(fresh(),
             [](PortSeen& s) { s.at_port.on_message(message(ptp::DelayReq{}), Way::kUdpIpv4); }),
-       "slaveOnly"},
+       "slaveOnly"}};
+}
+
+std::vector<Case> refused() {
+  return {
       {Cause::kNotAcceptable,
        with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kUnacceptableTransmitter); }),
        "--acceptable-transmitter"},
@@ -187,7 +191,7 @@ std::vector<Case> measured() {
 }
 
 TEST(PortDiagnosis, each_cause_has_its_sentence_and_none_says_locked) {
-  for (const auto& cases : {heard(), measured()}) {
+  for (const auto& cases : {heard(), refused(), measured()}) {
     for (const Case& one : cases) {
       const Finding found = diagnose(one.seen);
       const std::string text = sentence(found);

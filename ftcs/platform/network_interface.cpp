@@ -90,6 +90,13 @@ Result<InterfaceCapabilities, OsError> interface_capabilities(Kernel& kernel,
   return interface_capabilities(kernel, fd, name);
 }
 
+Result<InterfaceState, OsError> interface_state(Kernel& kernel, const std::string& name) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return os_error(-fd, "socket");
+  const Descriptor socket(kernel, fd);
+  return interface_state(kernel, fd, name);
+}
+
 std::optional<OsError> missing_ipv4_address(Kernel& kernel, int fd, const std::string& name) {
   ifreq request = request_for(name);
   request.ifr_addr.sa_family = AF_INET;

@@ -36,6 +36,8 @@ struct InterfaceCapabilities {
 [[nodiscard]] Result<InterfaceCapabilities, OsError> interface_capabilities(
     Kernel& kernel, int fd, const std::string& name);
 /// With a socket of its own.
+[[nodiscard]] Result<InterfaceState, OsError> interface_state(Kernel& kernel,
+                                                              const std::string& name);
 [[nodiscard]] Result<InterfaceCapabilities, OsError> interface_capabilities(
     Kernel& kernel, const std::string& name);
 /// No value: it has an IPv4 address. Else the reason.
