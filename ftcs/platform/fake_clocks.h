@@ -22,6 +22,8 @@ class FakeClocks : public FakeKernel {
     /// at one more while it owes time to what was asked for. That is decided at ticks, of which an
     /// idle processor has none, and when a rate is set. Zero: any rate.
     double multiplier_unit = 0.0;
+    /// A register makes the nearest multiple of this of what is commanded. Zero: any rate.
+    double rate_step = 0.0;
     double owed_ns = 0.0;
     bool catches_up = false;
     long tick = 10'000;
@@ -35,6 +37,7 @@ class FakeClocks : public FakeKernel {
              static_cast<double>(freq) / 65536.0 * 1e-6;
     }
     [[nodiscard]] double rate() const {
+      if (rate_step > 0.0) return 1.0 + std::round((steering() - 1.0) / rate_step) * rate_step;
       if (multiplier_unit == 0.0) return steering();
       return (std::floor(steering() / multiplier_unit) + (catches_up ? 1.0 : 0.0)) *
              multiplier_unit;

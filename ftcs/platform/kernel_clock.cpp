@@ -157,6 +157,8 @@ void KernelClock::take(const ClockDevice::Reading& now, FreeRunningTime instant)
                                 : ClockReading{history_.free_running_at(local), local};
   latest_raw_ns_ = now.raw_ns;
   latest_width_ns_ = now.width_ns;
+  if (!device_.is_system() && !is_wide(now.width_ns))
+    rate_steps_.on_reading(held_rate_.deviation(), now.raw_ns, now.clock_ns);
   if (static_cast<double>(now.width_ns) <= anchor_doubt_ns(now.raw_ns)) {
     anchor_ = {latest_.free_running, now.raw_ns, now.width_ns};
   }
@@ -177,6 +179,7 @@ void KernelClock::note_leap_or_step(const Deviation& deviation,
   foreign_.step = foreign_.step.value_or(Duration{}) + deviation.by;
   trusted_since_ns_ = now.clock_ns;
   wander_ = {};
+  rate_steps_.restart();
   forget_gain_interval();
 }
 
@@ -224,6 +227,7 @@ void KernelClock::check_rate() noexcept {
   if (std::abs(found->ratio() - held_rate_.ratio()) <= kRateUnit) return;
   foreign_.expected_rate = held_rate_;
   foreign_.found_rate = *found;
+  rate_steps_.restart();
   held_rate_ = *found;
   history_.steer(latest_.free_running, *found);
 }
@@ -244,14 +248,19 @@ Result<ClockReading, ClockError> KernelClock::apply(const ServoCommand& command)
   return latest_;
 }
 
+// What the clock makes of it is the rate that was meant: of the system clock on average, of a
+// hardware clock as far as its steps allow.
+Rate KernelClock::settable(Rate rate) const noexcept {
+  if (device_.is_system()) return Rate::from_ratio(rate.ratio() / gain_);
+  return Rate::from_ratio(1.0 + rate_steps_.steps().nearest(rate.deviation()));
+}
+
 Result<Rate, ClockError> KernelClock::command(Rate rate, Duration step) noexcept {
   const auto failed = [this](ClockError error) {
     if (error == ClockError::kGone) failure_ = error;
     return error;
   };
-  const Rate wanted =
-      device_.is_system() ? limits_.clamp(Rate::from_ratio(rate.ratio() / gain_)) : rate;
-  const auto set = device_.set_rate(wanted);
+  const auto set = device_.set_rate(limits_.clamp(settable(rate)));
   if (!set) return failed(set.error());
   if (step == Duration{}) return *set;
   if (const auto error = device_.step(step)) {
@@ -270,14 +279,17 @@ std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noe
   const auto set = command(rate, whole_step);
   if (!set) return set.error();
   const std::int64_t half_ns = (device_.read_raw() - before) / 2;
+  const Rate effective = device_.is_system() ? Rate::from_ratio(set->ratio() * gain_) : *set;
+  const double doubt_ns = std::abs(effective.ratio() - old_ratio) * static_cast<double>(half_ns);
+  rate_steps_.on_change(held_rate_.deviation(), before + half_ns, doubt_ns);
+  if (whole_step != Duration{}) rate_steps_.restart();
   held_rate_ = *set;
   has_steered_ = true;
-  const Rate effective = device_.is_system() ? Rate::from_ratio(set->ratio() * gain_) : *set;
   history_.steer(std::max(free_at_raw(before + half_ns), latest_.free_running), effective,
                  whole_step);
   const auto after = read_device();
   if (!after) return after.error();
-  place_change(*after, std::abs(effective.ratio() - old_ratio) * static_cast<double>(half_ns));
+  place_change(*after, doubt_ns);
   return std::nullopt;
 }
 

@@ -7,6 +7,7 @@
 #include "ftcs/clock/adjustable_clock.h"
 #include "ftcs/clock/steering_history.h"
 #include "ftcs/platform/clock_device.h"
+#include "ftcs/platform/rate_steps.h"
 
 namespace ftcs::platform {
 
@@ -116,6 +117,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   void note_leap_or_step(const Deviation& deviation, const ClockDevice::Reading& now) noexcept;
   void check_rate() noexcept;
   [[nodiscard]] std::optional<ClockError> change_rate(Rate rate, Duration step) noexcept;
+  [[nodiscard]] Rate settable(Rate rate) const noexcept;
   [[nodiscard]] Result<Rate, ClockError> command(Rate rate, Duration step) noexcept;
   void place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept;
   void end_correction() noexcept;
@@ -145,6 +147,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   double gain_ = 1.0;
   Duration gain_deviation_{};
   std::int64_t gain_elapsed_ns_ = 0;
+  RateStepMeter rate_steps_;  // of a hardware clock
   int expected_leap_ = 0;
   ForeignSteering foreign_{};
   std::uint64_t foreign_steps_ = 0;
