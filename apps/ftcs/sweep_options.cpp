@@ -80,6 +80,20 @@ SweepResult merge(const std::vector<Scenario>& scenarios, const std::vector<std:
   return experiment::merge_sweeps(scenarios, parts);
 }
 
+std::size_t runs_of(const std::vector<Scenario>& scenarios) {
+  std::size_t runs = 0;
+  for (const Scenario& scenario : scenarios) runs += scenario.servos.size() * scenario.seeds;
+  return runs;
+}
+
+std::size_t runs_in(const SweepResult& sweep) {
+  std::size_t runs = 0;
+  for (const auto& scenario : sweep.scenarios) {
+    for (const auto& servo : scenario.servos) runs += servo.runs.size();
+  }
+  return runs;
+}
+
 void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
   for (std::size_t i = 0; i < scenarios.size(); ++i) {
     const Scenario& scenario = scenarios[i];
@@ -167,7 +181,14 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
     fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
   if (!options.quiet) print(scenarios, sweep);
   // Also of a quiet run: a verdict without its reason helps nobody.
-  for (const auto& line : missed_limits(sweep)) fmt::print(stderr, "MISSED {}\n", line);
+  const bool judged = shard.count == 1;
+  if (judged) {
+    for (const auto& line : missed_limits(sweep)) fmt::print(stderr, "MISSED {}\n", line);
+  }
+  if (!options.merge.empty() && !sweep.complete) {
+    fmt::print(stderr, "ftcs: {} of {} runs are missing: are all shards there?\n",
+               runs_of(scenarios) - runs_in(sweep), runs_of(scenarios));
+  }
   const SweepOrigin origin{source, FTCS_VERSION};
   bool written =
       options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));
@@ -178,7 +199,6 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
         options.html.empty() || write_result(options.html, sweep_html(sweep, origin, traces));
     written &= options.trace.empty() || write_result(options.trace, trace_csv(traces));
   }
-  const bool judged = shard.count == 1;
   return written && !interrupt.flag() && (!judged || sweep.passed()) ? kSuccess : kRuntimeError;
 }
 
