@@ -29,6 +29,7 @@ ethercat::MainDeviceConfig CycleNode::main_config(const CycleNodeConfig& config,
   result.process.cycle = config.servo.cycle;
   const auto phase = config.sync0_phase * static_cast<double>(config.servo.cycle.count());
   result.process.sync0_shift = config.servo.shift + Nanoseconds{static_cast<std::int64_t>(phase)};
+  result.process.drive_sync = config.drive_sync;
   return result;
 }
 
@@ -43,11 +44,12 @@ BusClockConfig CycleNode::bus_config(const CycleNodeConfig& config) noexcept {
 CycleNode::CycleNode(const CycleNodeConfig& config) noexcept
     : config_(config),
       objects_(objects_for(config)),
-      main_(main_config(config, objects_)),
+      main_(main_config(config_, objects_)),
       servo_(config.servo),
       bus_(bus_config(config)),
       axes_(config.axes),
-      supervision_(config.supervision, config.servo.law != CycleLaw::kNone) {}
+      supervision_(config.supervision, config.servo.law != CycleLaw::kNone),
+      clocks_(config.difference_limit) {}
 
 const CycleDecision& CycleNode::start(FreeRunningTime now) noexcept {
   decision_ = servo_.start(now);
@@ -93,7 +95,15 @@ const CycleDecision& CycleNode::end_cycle(bool answered, const ethercat::FrameSt
   const bool ready =
       config_.bus_mode == BusMode::kFollow || bus_.decision().state == BusClockState::kLocked;
   supervision_.cycle(main_, decision_.state, ready, notes_);
+  clocks_.cycle(main_, settled(), notes_);
   return decision_;
+}
+
+/// A second after the first OP: the clocks have been together for as long.
+bool CycleNode::settled() const noexcept {
+  const std::int64_t op = supervision_.op_cycle();
+  const auto cycles = static_cast<std::int64_t>(servo_.counters().cycles);
+  return op >= 0 && (cycles - op) * config_.servo.cycle.count() > 1'000'000'000;
 }
 
 /// It is plant time that the cycle follows, as long as the drives are there too: should plant time

@@ -12,6 +12,7 @@
 #include "ftcs/ethercat/maindevice/main_device.h"
 #include "ftcs/node/cycle_notes.h"
 #include "ftcs/node/drive_axes.h"
+#include "ftcs/node/drive_clocks.h"
 #include "ftcs/node/drive_supervision.h"
 
 namespace ftcs::node {
@@ -39,6 +40,10 @@ struct CycleNodeConfig {
   /// 0x10F1:02 of the drives: a missed SYNC0 window counts three, a good one takes one off, and the
   /// drive faults above the limit; 0: never. No value: what the drive has of itself.
   std::optional<std::uint16_t> sync_error_limit;
+  /// SYNC signals of single drives, by position on the wire.
+  std::array<ethercat::DriveSync, ethercat::kMaxSubDevices> drive_sync{};
+  /// |0x092C| above which the clock of a drive counts as off; zero: none does.
+  Nanoseconds difference_limit{1'000};
   BusMode bus_mode = BusMode::kFollow;
   BusWrite bus_write = BusWrite::kOffset;
   BusClockConfig bus;  ///< its steer, cycle and sync0_phase are set by the node
@@ -93,6 +98,8 @@ class CycleNode {
   [[nodiscard]] const CycleServo& servo() const noexcept { return servo_; }
   /// How far the distributed clock is from plant time, in every mode.
   [[nodiscard]] const BusClockDecision& bus() const noexcept { return bus_.decision(); }
+  /// How far each drive's clock is from the reference's.
+  [[nodiscard]] const DriveClocks& clocks() const noexcept { return clocks_; }
   [[nodiscard]] const DriveAxes& axes() const noexcept { return axes_; }
   [[nodiscard]] const DriveSupervision& supervision() const noexcept { return supervision_; }
   [[nodiscard]] const CycleNodeConfig& config() const noexcept { return config_; }
@@ -113,6 +120,7 @@ class CycleNode {
   [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
   void write_time(FreeRunningTime now, ReferenceTime plant) noexcept;
   void lead(const ethercat::FrameStamps& stamps) noexcept;
+  [[nodiscard]] bool settled() const noexcept;
   void watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept;
 
   CycleNodeConfig config_;
@@ -122,6 +130,7 @@ class CycleNode {
   BusClock bus_;
   DriveAxes axes_;
   DriveSupervision supervision_;
+  DriveClocks clocks_;
   CycleDecision decision_;
   CycleSample sample_;
   CycleNotes notes_;

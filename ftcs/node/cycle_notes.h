@@ -26,6 +26,8 @@ struct CycleNote {
     kBusLockLost,
     kPlantTimeLost,  ///< holdover: the bus goes on at its last rate
     kPlantTimeBack,
+    kDriveClockOff,  ///< |0x092C| of a drive is above its limit
+    kDriveClockBack,
   };
   static constexpr std::uint16_t kNobody = 0xFFFF;
   Kind kind = Kind::kLocked;

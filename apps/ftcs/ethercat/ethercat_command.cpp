@@ -61,6 +61,46 @@ void read_udp(const std::string& text, daemon::RunOptions& options) {
   options.port = static_cast<std::uint16_t>(*port);
 }
 
+/// "2=100us": the SYNC0 of drive 2 comes so much later; "2=1:250us": its SYNC1 once in so many
+/// cycles, so long behind SYNC0.
+void read_drive_sync(const char* flag, const std::string& text, bool sync1,
+                     daemon::RunOptions& options) {
+  const auto wrong = [flag, &text, sync1] {
+    return CLI::ValidationError(
+        flag, fmt::format("'{}': expected DRIVE={}, as in {}", text,
+                          sync1 ? "CYCLES:SHIFT" : "SHIFT", sync1 ? "2=1:250us" : "2=100us"));
+  };
+  const std::size_t equals = text.find('=');
+  const std::size_t colon = sync1 ? text.find(':') : equals;
+  if (equals == std::string::npos || colon == std::string::npos || colon < equals) throw wrong();
+  const auto drive = parse_integer(text.substr(0, equals), 0, ethercat::kMaxSubDevices - 1);
+  const auto shift = parse_duration(text.substr(colon + 1));
+  if (!drive || !shift) throw wrong();
+  ethercat::DriveSync& sync = options.drive_sync[static_cast<std::size_t>(*drive)];
+  (sync1 ? sync.sync1_shift : sync.sync0_shift) = Nanoseconds{shift->rounded_ns()};
+  if (!sync1) return;
+  const auto cycles = parse_integer(text.substr(equals + 1, colon - equals - 1), 1, 1000);
+  if (!cycles) throw wrong();
+  sync.sync1_cycles = static_cast<std::uint16_t>(*cycles);
+}
+
+/// Shifts are within a cycle, which is known at the end alone.
+std::optional<std::string> check_drive_sync(const daemon::RunOptions& options) {
+  const Nanoseconds cycle = options.servo.cycle;
+  for (std::size_t n = 0; n < options.drive_sync.size(); ++n) {
+    const ethercat::DriveSync& sync = options.drive_sync[n];
+    if (sync.sync0_shift <= -cycle || sync.sync0_shift >= cycle) {
+      return fmt::format("--sync0-shift: drive {}: {} ns is a cycle or more", n,
+                         sync.sync0_shift.count());
+    }
+    if (sync.sync1_shift < Nanoseconds{0} || sync.sync1_shift >= cycle) {
+      return fmt::format("--sync1: drive {}: {} ns is not from zero to below a cycle", n,
+                         sync.sync1_shift.count());
+    }
+  }
+  return std::nullopt;
+}
+
 /// What hangs on several flags.
 std::optional<std::string> complete(EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
@@ -76,6 +116,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   if (options.bus_mode != node::BusMode::kFollow && options.plant_time.empty()) {
     return "--bus-mode: lead and external need --plant-time, the clock that is to be followed";
   }
+  if (auto wrong = check_drive_sync(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
     return "--gains: two numbers, as in 1,1";
@@ -173,6 +214,22 @@ void add_drive_flags(CLI::App& command, daemon::RunOptions& options) {
   command.add_flag("!--no-motion", options.move, "leave the axes disabled");
 }
 
+/// SYNC signals of single drives, and how far their clocks may be off.
+void add_sync_flags(CLI::App& command, daemon::RunOptions& options) {
+  for (const bool sync1 : {false, true}) {
+    const char* const flag = sync1 ? "--sync1" : "--sync0-shift";
+    command.add_option_function<std::vector<std::string>>(
+        flag,
+        [flag, sync1, &options](const std::vector<std::string>& texts) {
+          for (const std::string& text : texts) read_drive_sync(flag, text, sync1, options);
+        },
+        sync1 ? "DRIVE=CYCLES:SHIFT: SYNC1 of one drive; may be repeated"
+              : "DRIVE=SHIFT: SYNC0 of one drive so much later than the others'; may be repeated");
+  }
+  add_time(command, "--difference-limit", options.difference_limit, 0,
+           "|0x092C| above which the clock of a drive counts as off; default 1us, 0 never");
+}
+
 void add_plant_time_flags(CLI::App& command, daemon::RunOptions& options) {
   command.add_option("--plant-time", options.plant_time,
                      "ptp:INTERFACE (a PTP receiver of this process), tai (CLOCK_TAI), realtime, "
@@ -245,6 +302,7 @@ void add_ethercat_command(CLI::App& app, int& exit_code) {
   add_servo_flags(*run, *arguments);
   add_run_flags(*run, options);
   add_drive_flags(*run, options);
+  add_sync_flags(*run, options);
   add_plant_time_flags(*run, options);
   add_bus_flags(*run, options);
   run->callback(

@@ -49,6 +49,8 @@ node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
   config.axes.turn_s = options.turn_s;
   config.axes.fault_resets = options.fault_resets;
   config.axes.start_s = options.start_s;
+  config.drive_sync = options.drive_sync;
+  config.difference_limit = options.difference_limit;
   config.bus_mode = options.bus_mode;
   config.bus_write = options.bus_write;
   config.bus.limits = RateLimits::symmetric_ppb(1e3 * options.bus_limit_ppm);
@@ -188,14 +190,15 @@ std::string_view MainRunner::service_sentence() {
 void MainRunner::print_live() const {
   const ethercat::CycleReport& report = main().last_cycle();
   const double rate = decision().rate.ratio();
+  const std::size_t worst = clocks().worst(main().network().count);
   fmt::print(
       "margin {:7.1f} us  {:9} (first after {})  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle "
       "{:.6f} ms  "
-      "wkc {}/{}  al 0x{:02X}  |0x092C| < {} ns  lost {}  late {}\n",
+      "wkc {}/{}  al 0x{:02X}  |0x092C| {} ns (drive {})  lost {}  late {}\n",
       figures().margin.quantile(0.5) * 1e-3, name(decision().state), figures().lock_cycle,
       decision().phase_error.ns() * 1e-3, decision().rate.ppm(),
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
-      report.expected, report.states, report.difference_bound_ns + 1, main().counters().lost,
+      report.expected, report.states, clocks()[worst].last, worst, main().counters().lost,
       servo_counters().late);
   if (plant_) {
     fmt::print("bus {:9}  dc to plant {:+12.3f} us (sigma {:.3f})  bus rate {:+9.3f} ppm\n",

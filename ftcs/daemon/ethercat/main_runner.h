@@ -34,6 +34,7 @@ class MainRunner {
   /// The drives are put onto plant time before the first cycle: waits until it is known. One
   /// sentence if it is not within --await-lock (zero: half a minute), or `stop` came first.
   [[nodiscard]] std::optional<std::string> await_plant_time(const std::function<bool()>& stop);
+  [[nodiscard]] const node::DriveClocks& clocks() const { return node_->clocks(); }
   [[nodiscard]] const BusClockDecision& bus() const { return node_->bus(); }
   [[nodiscard]] std::optional<WriteError> finish_csv() { return csv_.finish(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).

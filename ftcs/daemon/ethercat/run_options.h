@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -41,6 +42,10 @@ struct RunOptions {
   double radius = 10'000.0;  ///< counts
   double turn_s = 2.0;
   double start_s = 0.0;  ///< instant of plant time at which the circles begin; zero: at once
+  /// SYNC signals of single drives, by position on the wire.
+  std::array<ethercat::DriveSync, ethercat::kMaxSubDevices> drive_sync{};
+  /// |0x092C| above which the clock of a drive counts as off; zero: none does.
+  Nanoseconds difference_limit{1'000};
   node::BusMode bus_mode = node::BusMode::kFollow;
   node::BusWrite bus_write = node::BusWrite::kOffset;
   std::string plant_time;  ///< source (open_plant_clock()); empty: none

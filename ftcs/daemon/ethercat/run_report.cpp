@@ -35,12 +35,16 @@ Json quantiles(const QuantileSketch& sketch, bool absolute) {
 Json drives_json(const MainRunner& runner) {
   Json drives = Json::array();
   for (const ethercat::SubDeviceInfo& device : runner.main().network().all()) {
+    const node::DriveClocks::Seen& clock = runner.clocks()[drives.size()];
     drives.push_back(Json{{"station", device.station},
                           {"name", device.sii.device_name.data()},
                           {"state", ethercat::name(device.state)},
                           {"al_status_code", static_cast<unsigned>(device.code)},
                           {"al_status", ethercat::name(device.code)},
-                          {"propagation_delay_ns", device.propagation_delay}});
+                          {"propagation_delay_ns", device.propagation_delay},
+                          {"system_time_difference_ns", clock.last},
+                          {"largest_difference_ns", clock.largest},
+                          {"differences_beyond_limit", clock.beyond}});
   }
   return drives;
 }
@@ -103,6 +107,21 @@ void print_events(const experiment::CycleFigures& figures) {
                  ethercat::name(event.note.code));
     }
     fmt::print("\n");
+  }
+}
+
+/// |0x092C| of each drive, and who was beyond the limit.
+void print_clocks(const MainRunner& runner) {
+  fmt::print("|0x092C| of each drive, largest:");
+  for (std::size_t n = 0; n < runner.main().network().count; ++n) {
+    fmt::print(" {}", runner.clocks()[n].largest);
+  }
+  fmt::print(" ns\n");
+  for (std::size_t n = 0; n < runner.main().network().count; ++n) {
+    const node::DriveClocks::Seen& clock = runner.clocks()[n];
+    if (clock.beyond == 0) continue;
+    fmt::print("drive {}: beyond {} ns in {} of {} readings\n", n,
+               runner.options().difference_limit.count(), clock.beyond, clock.readings);
   }
 }
 
@@ -170,6 +189,10 @@ const char* name(node::CycleNote::Kind kind) {
       return "plant time lost, bus in holdover";
     case node::CycleNote::Kind::kPlantTimeBack:
       return "plant time back";
+    case node::CycleNote::Kind::kDriveClockOff:
+      return "clock off the reference's";
+    case node::CycleNote::Kind::kDriveClockBack:
+      return "clock back at the reference's";
   }
   return "unknown";
 }
@@ -271,6 +294,7 @@ void print_run(const MainRunner& runner) {
   print_histograms(figures);
   fmt::print("|0x092C| from one second after the lock: under {} ns (bound)\n",
              figures.worst_difference_ns + 1);
+  print_clocks(runner);
   fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}, doubtful stamps {}\n",
              runner.decision().rate.ppm(), servo.resyncs, servo.impossible, servo.doubtful);
   if (!runner.options().plant_time.empty()) {

@@ -14,7 +14,7 @@ constexpr std::size_t kAlStatusSize = 6;
 /// Defaults for a SubDevice whose SII does not describe its sync managers.
 constexpr std::uint8_t kMailboxOutControl = 0x26;
 constexpr std::uint8_t kMailboxInControl = 0x22;
-constexpr std::uint8_t kActivate = reg::kActivateCyclic | reg::kActivateSync0;
+constexpr unsigned kActivate = reg::kActivateCyclic | reg::kActivateSync0;
 
 SyncManagerChannel process_channel(const SubDeviceInfo& device, std::size_t n,
                                    std::uint16_t size) noexcept {
@@ -168,12 +168,18 @@ void Configurator::write_channels(FrameWriter& writer, const SubDeviceInfo& devi
 
 void Configurator::write_sync0(FrameWriter& writer, const SubDeviceInfo& device) noexcept {
   using enum Command;
+  const DriveSync own =
+      device_ < config_.drive_sync.size() ? config_.drive_sync[device_] : DriveSync{};
+  const bool sync1 = own.sync1_cycles > 0;
+  const auto shift = static_cast<std::uint64_t>(own.sync0_shift.count());
   writer.add_value(device.target(kFpwr, reg::kDcActivation), std::uint8_t{0});
   writer.add_value(device.target(kFpwr, reg::kCyclicUnitControl), std::uint8_t{0});
   writer.add_value(device.target(kFpwr, reg::kSync0CycleTime),
                    static_cast<std::uint32_t>(config_.cycle.count()));
-  writer.add_value(device.target(kFpwr, reg::kSync0StartTime), sync0_start_);
-  writer.add_value(device.target(kFpwr, reg::kDcActivation), kActivate);
+  writer.add_value(device.target(kFpwr, reg::kSync1CycleTime), own.sync1_register(config_.cycle));
+  writer.add_value(device.target(kFpwr, reg::kSync0StartTime), sync0_start_ + shift);
+  writer.add_value(device.target(kFpwr, reg::kDcActivation),
+                   static_cast<std::uint8_t>(kActivate | (sync1 ? reg::kActivateSync1 : 0U)));
 }
 
 Progress Configurator::take_reference_time(ConstBytes system_time, Network& network,

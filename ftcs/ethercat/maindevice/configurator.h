@@ -10,6 +10,20 @@
 
 namespace ftcs::ethercat {
 
+/// SYNC signals of one SubDevice, beside what all have.
+struct DriveSync {
+  Nanoseconds sync0_shift{0};  ///< SYNC0 so much later than that of the others; may be negative
+  /// SYNC1 comes once in so many cycles; 0: never.
+  std::uint16_t sync1_cycles = 0;
+  Nanoseconds sync1_shift{0};  ///< behind a SYNC0; from zero to below a cycle
+
+  /// The register 0x09A4 for it.
+  [[nodiscard]] constexpr std::uint32_t sync1_register(Nanoseconds cycle) const noexcept {
+    const std::int64_t left_out = sync1_cycles > 0 ? sync1_cycles - 1 : 0;
+    return static_cast<std::uint32_t>(left_out * cycle.count() + sync1_shift.count());
+  }
+};
+
 struct ConfiguratorConfig {
   std::span<const SdoDownload> objects;  ///< written to every SubDevice with CoE, in PREOP
   Nanoseconds cycle{1'000'000};
@@ -18,6 +32,8 @@ struct ConfiguratorConfig {
   /// The first SYNC0 lies so far ahead that all SubDevices have been told in time.
   Nanoseconds sync0_lead{100'000'000};
   bool sync0 = true;
+  /// By position on the wire; who is beyond its end has nothing of its own.
+  std::span<const DriveSync> drive_sync;
   Nanoseconds state_timeout{2'000'000'000};
   Nanoseconds sdo_timeout{1'000'000'000};
 };

@@ -87,6 +87,12 @@ void CyclicExchange::request(FrameWriter& writer, const Network& network) noexce
     ++datagrams_;
   }
   writer.add({kBrd, 0, reg::kAlStatus}, 2);
+  ask_in_turn(writer, network);
+}
+
+void CyclicExchange::ask_in_turn(FrameWriter& writer, const Network& network) noexcept {
+  using enum Command;
+  compares_ = false;
   const auto* waiting = std::find_if(control_.begin(), control_.begin() + network.count,
                                      [](std::uint16_t control) { return control != 0; });
   turn_is_control_ = waiting != control_.begin() + network.count && !hurry_;
@@ -98,6 +104,14 @@ void CyclicExchange::request(FrameWriter& writer, const Network& network) noexce
   }
   turn_ = (turn_ + std::max<std::size_t>(turns_, 1)) % network.count;
   turns_ = 0;
+  const SubDeviceInfo& first = network.devices[turn_];
+  // Who is to be brought back needs the room.
+  compares_ = !hurry_ && expected_ == whole_ && first.dc() &&
+              writer.room() >= 4 + kAlStatusSize + 2 * kDatagramOverhead;
+  if (compares_) {
+    writer.add(first.target(kFprd, reg::kSystemTimeDifference), 4);
+    ++datagrams_;
+  }
   const std::size_t most = std::min(hurry_ ? kHurriedTurns : 1, network.count);
   do {
     const std::size_t n = (turn_ + turns_) % network.count;
@@ -162,6 +176,12 @@ CycleReport CyclicExchange::reply(const FrameView& frame, Network& network) noex
   report.answering = states.working_counter();
   report.states = load<std::uint16_t>(states.data(), 0);
   hurry_ = !report.inputs_valid;
+  ++datagram;
+  if (compares_ && (*datagram).working_counter() == 1) {
+    report.compared = static_cast<std::uint16_t>(turn_);
+    network.devices[turn_].system_time_difference =
+        load<std::uint32_t>((*datagram).data(), 0) & kMagnitude;
+  }
   take_turns(frame.from(datagrams_ - turns_), network);
   return report;
 }

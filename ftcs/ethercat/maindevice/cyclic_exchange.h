@@ -22,6 +22,9 @@ struct CycleReport {
   ReferenceTime reference;
   /// Upper bound of |0x092C| over all SubDevices (their magnitudes OR-ed), ns.
   std::uint32_t difference_bound_ns = 0;
+  /// Whose own |0x092C| this frame brought (SubDeviceInfo has it); kNobody: nobody's.
+  static constexpr std::uint16_t kNobody = 0xFFFF;
+  std::uint16_t compared = kNobody;
   std::uint16_t answering = 0;  ///< SubDevices that this frame passed
   std::uint16_t states = 0;     ///< AL states OR-ed, error flag included
   [[nodiscard]] bool all_operational() const noexcept {
@@ -31,10 +34,10 @@ struct CycleReport {
 
 /// The cyclic frame: FRMW of the system time first (its latch is the start of frame), where the
 /// bus is moved the reference's system time offset, LRW of the process image, BRD of 0x092C, BRD of
-/// the AL status, and one datagram for the AL control or status of one SubDevice in turn; after a
-/// wrong working counter several, so that whoever is missing is soon known. A SubDevice that does
-/// not answer takes no part until it is admitted again: its process data is zero and nobody expects
-/// it in the working counter.
+/// the AL status, and for one SubDevice in turn its 0x092C and AL status, or its AL control; after
+/// a wrong working counter the states of several, so that whoever is missing is soon known. A
+/// SubDevice that does not answer takes no part until it is admitted again: its process data is
+/// zero and nobody expects it in the working counter.
 class CyclicExchange {
  public:
   void start(const Network& network) noexcept;
@@ -81,6 +84,7 @@ class CyclicExchange {
   }
   void take_reference(const Datagram& time, const Network& network, CycleReport& report) noexcept;
   [[nodiscard]] ReferenceTime unwrap(ConstBytes data, bool wide) noexcept;
+  void ask_in_turn(FrameWriter& writer, const Network& network) noexcept;
   void take_turns(const FrameView& turns, Network& network) noexcept;
 
   std::array<std::uint8_t, kMaxImageSize> image_{};
@@ -100,7 +104,8 @@ class CyclicExchange {
   std::size_t turn_ = 0;
   std::size_t turns_ = 0;  ///< SubDevices asked in this frame, turn_ the first
   bool turn_is_control_ = false;
-  bool hurry_ = false;  ///< the last working counter was wrong
+  bool compares_ = false;  ///< 0x092C of SubDevice turn_ is asked for in this frame
+  bool hurry_ = false;     ///< the last working counter was wrong
   std::uint64_t last_reference_ = 0;
 };
 

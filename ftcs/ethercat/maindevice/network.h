@@ -46,6 +46,8 @@ struct SubDeviceInfo {
   std::uint64_t receive_time = 0;  ///< at the processing unit, local time
   std::uint32_t propagation_delay = 0;
   std::uint64_t system_time_offset = 0;
+  /// |0x092C|, ns, as read in its turn.
+  std::uint32_t system_time_difference = 0;
 
   ImagePart outputs;
   ImagePart inputs;

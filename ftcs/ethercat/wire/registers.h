@@ -91,15 +91,20 @@ inline constexpr std::uint16_t kActivationStatus = 0x0984;  ///< 1: bit 0: SYNC0
 inline constexpr std::uint16_t kSync0Status = 0x098E;       ///< 1: SYNC0 is pending (acknowledged)
 inline constexpr std::uint16_t kSync0StartTime = 0x0990;    ///< 8: first SYNC0; later the next one.
                                                             ///< In the past: it never comes
+inline constexpr std::uint16_t kSync1StartTime = 0x0998;    ///< 8, read only: the next SYNC1
 inline constexpr std::uint16_t kSync0CycleTime = 0x09A0;    ///< 4: 0 = once
-inline constexpr std::uint16_t kSync1CycleTime = 0x09A4;    ///< 4: SYNC1 so long behind SYNC0
-inline constexpr std::uint16_t kLatchUnit = 0x09A8;         ///< 1 each: latch inputs
+/// 4: SYNC1 so long behind SYNC0. From a SYNC0 cycle on it leaves events out: v behind the first
+/// SYNC0, then every (floor(v / cycle) + 1) cycles.
+inline constexpr std::uint16_t kSync1CycleTime = 0x09A4;
+inline constexpr std::uint16_t kLatchUnit = 0x09A8;   ///< 1 each: latch inputs
 inline constexpr std::uint16_t kProcessRam = 0x1000;  ///< mailboxes and process data from here
 
 inline constexpr std::uint16_t kFeatureDc = 0x0004;    ///< in kFeatures: has a distributed clock
 inline constexpr std::uint16_t kFeatureDc64 = 0x0008;  ///< in kFeatures: of 64 bits, else 32
 inline constexpr std::uint8_t kActivateCyclic = 0x01;  ///< in kDcActivation: the unit runs
 inline constexpr std::uint8_t kActivateSync0 = 0x02;   ///< in kDcActivation: SYNC0 is generated
+
+inline constexpr std::uint8_t kActivateSync1 = 0x04;  ///< in kDcActivation: SYNC1 is generated
 
 inline constexpr std::size_t kFmmuSize = 16;        ///< octets a channel
 inline constexpr std::size_t kSyncManagerSize = 8;  ///< octets a channel

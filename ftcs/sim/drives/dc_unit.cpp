@@ -61,6 +61,7 @@ void DcUnit::refresh(WireTime sof) noexcept {
   const auto delay = memory_.get<std::uint32_t>(reg::kSystemTimeDelay);
   memory_.set(reg::kSystemTime, system_time(sof) - delay);
   if (armed_) memory_.set(reg::kSync0StartTime, next_sync0_);
+  memory_.set(reg::kSync1StartTime, next_sync1(sof));
 }
 
 void DcUnit::latch_arrival(WireTime sof) noexcept {
@@ -147,11 +148,22 @@ void DcUnit::activate(WireTime now) noexcept {
   if ((activation & kBoth) != kBoth) {
     armed_ = false;
   } else if (!armed_) {
-    next_sync0_ = memory_.get<std::uint64_t>(reg::kSync0StartTime);
+    first_sync0_ = next_sync0_ = memory_.get<std::uint64_t>(reg::kSync0StartTime);
     // A start in the past never fires: the comparator waits for equality.
     armed_ = static_cast<std::int64_t>(next_sync0_ - system_time(now)) > 0;
   }
   memory_.set(reg::kActivationStatus, static_cast<std::uint8_t>(armed_ ? 1 : 0));
+}
+
+std::uint64_t DcUnit::next_sync1(WireTime now) const noexcept {
+  const auto activation = memory_.get<std::uint8_t>(reg::kDcActivation);
+  const std::uint64_t cycle = memory_.get<std::uint32_t>(reg::kSync0CycleTime);
+  if (!armed_ || cycle == 0 || (activation & reg::kActivateSync1) == 0) return 0;
+  const std::uint64_t behind = memory_.get<std::uint32_t>(reg::kSync1CycleTime);
+  const std::uint64_t period = (behind / cycle + 1) * cycle;
+  const std::uint64_t first = first_sync0_ + behind;
+  const std::uint64_t shown = system_time(now);
+  return shown < first ? first : first + ((shown - first) / period + 1) * period;
 }
 
 bool DcUnit::take_sync0(WireTime now, Sync0Event& event) noexcept {

@@ -66,6 +66,8 @@ class DcUnit {
   void skip_sync0(WireTime now) noexcept;
 
  private:
+  /// The next SYNC1; zero: none is generated.
+  [[nodiscard]] std::uint64_t next_sync1(WireTime now) const noexcept;
   [[nodiscard]] Duration ticks(WireTime instant) const noexcept;
   [[nodiscard]] std::uint64_t offset() const noexcept {
     return memory_.get<std::uint64_t>(reg::kSystemTimeOffset);
@@ -90,6 +92,7 @@ class DcUnit {
 
   bool armed_ = false;
   std::uint64_t next_sync0_ = 0;
+  std::uint64_t first_sync0_ = 0;
 };
 
 }  // namespace ftcs::ethercat
