@@ -202,8 +202,9 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
 
   const double credit = innovations.credit[best_];
   const double innovation = innovations.centred[best_] + scale_ * shape_[side].tail;
+  innovation_ = static_cast<float>(innovation);
   const double predicted = innovations.predicted[best_];
-  gain_ = credit * predicted / (predicted + shape_[side].total_variance());
+  gain_ = static_cast<float>(credit * predicted / (predicted + shape_[side].total_variance()));
   if (count_ > kEvidenceFrom && observable()) {
     // The credit of the best model, for all: a model that rejected every
     // message as an outlier would otherwise gather no squares and look perfect.
@@ -501,6 +502,11 @@ double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
   then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
   const double floor = floor_doubt_ns();
   return std::sqrt(scale_ * scale_ * widening() * std::max(then.xx, 0.0) + floor * floor);
+}
+
+template <class Grid>
+bool Estimator<Grid>::settled() const noexcept {
+  return std::min(count_, since_change_) > kYoung && learner_[0].mature() && learner_[1].mature();
 }
 
 template <class Grid>

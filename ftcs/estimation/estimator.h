@@ -68,6 +68,10 @@ class Estimator {
   [[nodiscard]] double scale() const noexcept { return scale_; }
   /// ln density that the best model gave the last message, outliers included.
   [[nodiscard]] double log_density() const noexcept { return static_cast<double>(said_); }
+  /// By how much the last message was late, ns, as the best model saw it.
+  [[nodiscard]] double innovation_ns() const noexcept { return static_cast<double>(innovation_); }
+  /// Nothing has changed for long, and the noise of both directions is learnt.
+  [[nodiscard]] bool settled() const noexcept;
   [[nodiscard]] const ModelBank<Grid>& bank() const noexcept { return bank_; }
   [[nodiscard]] const Evidence<Grid>& evidence() const noexcept { return evidence_; }
   /// Honest standard deviation of the offset `cycles` after the last message,
@@ -86,7 +90,7 @@ class Estimator {
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
   /// Gain of the last raw innovation on the offset: the effective p.
-  [[nodiscard]] double gain() const noexcept { return gain_; }
+  [[nodiscard]] double gain() const noexcept { return static_cast<double>(gain_); }
   /// The unit of time becomes `factor` times as long.
   void rescale_time(double factor) noexcept;
   /// Every offset, past ones included, grows by `shift_ns`.
@@ -146,7 +150,8 @@ class Estimator {
   double scale_ = 100.0;
   double robust_scale_ = 100.0;
   double least_noise_ = 1e-4;
-  double gain_ = 1.0;
+  float gain_ = 1.0F;
+  float innovation_ = 0.0F;      ///< of the last message
   double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations
   NoiseModel process_{};         ///< mean of the models' noise under their weights
   Estimate mixed_{};

@@ -29,6 +29,8 @@ constexpr double kMostShare = 0.995;
 /// Share at the floor above which what is late is an outlier rather than one
 /// that waited, as others do.
 constexpr double kWaitsAreUsual = 0.85;
+/// Where nothing has waited so far.
+constexpr double kShareUnproven = 0.9;
 /// A square counts at most so many variances.
 constexpr double kSquareLimit = 60.0;
 /// Three sigma early, squared, and for how many messages it is remembered: late
@@ -92,7 +94,10 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
   said_ = in.log_density[best_];
   testimony_ = {
       quick_exp(std::max(log_normal(in.distance[best_], in.log_variance[best_]), kLeastLogDensity)),
-      0.0, path.share, path.recent_share,
+      0.0,
+      path.share,
+      path.recent_share,
+      late,
       late && std::min(path.share, path.recent_share) < kWaitsAreUsual};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
                             : (1.0 - credit) * quick_exp(std::max(said_, kLeastLogDensity));
@@ -225,34 +230,53 @@ void FloorEstimator::look() noexcept {
   search_.adopt();
 }
 
-void FloorEstimator::adopt(const FloorFit& fit) noexcept {
-  scale_ = std::max(fit.sigma(), least_noise_);
-  mean_wait_ = fit.noise.forward.mean_wait;
-  certainty_ = fit.evidence;
+void FloorEstimator::begin(double scale, double wait) noexcept {
+  scale_ = std::max(scale, least_noise_);
+  mean_wait_ = wait;
   evidence_.forget();
   detector_.clear();
   jumps_.clear();
   weight_.fill(0.0);
   best_ = FloorGrid::kStart;
   weight_[best_] = 1.0;
+  count_ = 8;
+  early_ = 0;
+  locked_ = adopted_ = true;
+}
+
+void FloorEstimator::begin_path(Path& path, double share, double members) noexcept {
+  path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
+  path.variance = scale_ * scale_;
+  path.members = members;
+  path.heard = path.dry = 0.0;
+  path.waits.start(mean_wait_);
+}
+
+void FloorEstimator::adopt(const FloorFit& fit) noexcept {
+  begin(fit.sigma(), fit.noise.forward.mean_wait);
+  certainty_ = fit.evidence;
   hear_members_again(fit);
   for (const Direction direction : kDirections) {
     // The earliest of b messages is at the floor with probability 1 - (1 -
     // w)^b.
     const double entries = 1.0 / static_cast<double>(search_.stride());
     const double share = 1.0 - std::pow(1.0 - fit.noise[direction].share, entries);
-    Path& path = paths_[direction];
-    path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
-    path.variance = scale_ * scale_;
-    path.members = std::min(fit.members[direction], 10.0);
-    path.heard = path.dry = 0.0;
-    path.waits.start(mean_wait_);
+    begin_path(paths_[direction], share, std::min(fit.members[direction], 10.0));
   }
-  count_ = 8;
-  early_ = 0;
-  locked_ = adopted_ = true;
   mixed_ = bank_.mixture(weight_, scale_);
   process_ = bank_.mean_noise(weight_);
+}
+
+void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
+                                double scale, const PerDirection<double>& noise,
+                                double wait) noexcept {
+  begin(scale, wait);
+  certainty_ = 0.0;
+  for (const Direction direction : kDirections) {
+    begin_path(paths_[direction], kShareUnproven, kNoiseMemory / 10.0);
+    paths_[direction].variance = noise[direction] * noise[direction];
+  }
+  take_from(bank, evidence, scale);
 }
 
 /// The line's noise includes what the oscillator did meanwhile. Heard once

@@ -33,6 +33,7 @@ class FloorEstimator {
     double waiting = 0.0;   ///< of one that waits
     double share = 0.5;     ///< of messages at the floor in its direction, by a long memory
     double recent_share = 0.5;
+    bool late = false;
     bool waited = false;  ///< late, where waiting is usual
   };
 
@@ -54,6 +55,10 @@ class FloorEstimator {
   /// it better.
   void take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
                  double scale) noexcept;
+  /// A path on which nothing has waited, known to others: what they know is the
+  /// floor, should messages wait from now on. `wait`: of the first that did, ns.
+  void start_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence, double scale,
+                  const PerDirection<double>& noise, double wait) noexcept;
   /// What is followed is not the floor: to be found anew.
   void unlock() noexcept { locked_ = false; }
   /// Messages wait, as others see it.
@@ -98,6 +103,8 @@ class FloorEstimator {
   void choose() noexcept;
   void look() noexcept;
   void adopt(const FloorFit& fit) noexcept;
+  void begin(double scale, double wait) noexcept;
+  void begin_path(Path& path, double share, double members) noexcept;
   void hear_members_again(const FloorFit& fit) noexcept;
   [[nodiscard]] FloorSearch::Rival rival() const noexcept;
 

@@ -34,6 +34,9 @@ constexpr double kSharper = 32.0;
 constexpr double kFarApart = 1.0 / 32.0;
 constexpr double kShort = 1.0 / 64.0;
 constexpr double kLeastLogDensity = -600.0;
+/// Messages.
+constexpr std::uint8_t kLateMemory = 8;
+constexpr std::uint8_t kYoungFor = 16;
 
 }  // namespace
 
@@ -85,6 +88,33 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   if (explained_alone_ >= kExplainedAlone) floor_.unlock();
 }
 
+/// On a path that was settled: a second message of the last few that is late by
+/// more than outliers explain, and none of them early.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::begins_to_wait(double credit) noexcept {
+  const bool off = credit < 0.5;
+  const bool is_late = off && plain_.innovation_ns() > 0.0;
+  const bool begins = is_late && late_ > 0 && plain_.settled();
+  if (off) {
+    late_ = is_late ? kLateMemory : 0;
+  } else if (late_ > 0) {
+    --late_;
+  }
+  return begins;
+}
+
+template <class Grid>
+void LoadAwareEstimator<Grid>::start_floor() noexcept {
+  const PerDirection<double> noise{plain_.noise_ns(Direction::kForward),
+                                   plain_.noise_ns(Direction::kBackward)};
+  floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise,
+                    plain_.innovation_ns());
+  lead_ = recent_lead_ = 0.0;
+  explained_alone_ = 0;
+  young_ = kYoungFor;
+  believed_ = true;
+}
+
 template <class Grid>
 double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double credit = plain_.update(seen);
@@ -99,6 +129,12 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const bool followed = floor_.locked();
   if (credit < 0.5 && !followed) floor_.wake();
   const double own = floor_.update(seen, plain_.estimate().y);
+  const bool begins = begins_to_wait(credit);
+  if (begins && !floor_.locked()) {
+    start_floor();
+    return credit;
+  }
+  if (young_ > 0 && --young_ > 0 && own < 0.5 && !floor_.testimony().late) floor_.unlock();
   bool agreed = false;
   if (floor_.adopted()) {
     explained_alone_ = 0;

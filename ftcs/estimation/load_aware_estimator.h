@@ -76,6 +76,8 @@ class LoadAwareEstimator {
   void forget_floor() noexcept;
   [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
+  [[nodiscard]] bool begins_to_wait(double credit) noexcept;
+  void start_floor() noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
 
@@ -85,6 +87,9 @@ class LoadAwareEstimator {
   double recent_lead_ = 0.0;                    ///< by its short one
   PerDirection<double> learnt_part_{0.5, 0.5};  ///< q
   std::uint8_t explained_alone_ = 0;  ///< messages that the first picture explains, not the second
+  std::uint8_t late_ = 0;             ///< messages for which a late one is remembered
+  std::uint8_t young_ =
+      0;  ///< messages in which an early one is the end of a floor from the first picture
   bool believed_ = false;
 };
 
