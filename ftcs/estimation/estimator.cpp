@@ -56,6 +56,8 @@ std::size_t index_of(Direction direction) noexcept {
 constexpr double kSurpriseShare = 1.0 / 6.0;
 constexpr double kUsualSurprise = 1.6;
 constexpr double kSurpriseLimit = 100.0;
+/// Variances of both directions that differ by less are of one kind of load.
+constexpr double kAlike = 4.0;
 /// The sharpest shape tried has a normal part of a seventh of the tail. Where
 /// that is the best shape the true edge is anything between that soft and as
 /// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
@@ -65,6 +67,13 @@ constexpr double kFloorDoubt = 0.03;
 constexpr double kSharpest = 0.97;
 
 double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
+
+/// Noise of one kind: what it is, a queue or outliers, is decided for both
+/// directions at once. One that alone took its noise for a queue would move the
+/// offset by half a tail.
+bool alike(double variance, double other) noexcept {
+  return std::max(variance, other) < kAlike * std::min(variance, other);
+}
 
 /// Geometric mean of the standard deviations of one or both directions, of the
 /// product of their variances.
@@ -434,11 +443,17 @@ void Estimator<Grid>::adopt_shapes() noexcept {
   double product = 1.0;
   int sides = 0;
   std::array<DelayShape, 2> in_ns{};
+  std::array<typename NoiseLearner<Grid::kNoiseWindow>::Case, 2> said{learner_[0].plead(),
+                                                                      learner_[1].plead()};
+  if (two_way() && alike(learner_[0].variance(), learner_[1].variance())) {
+    said[0].add(said[1]);
+    said[1] = said[0];
+  }
   for (std::size_t side = 0; side < 2; ++side) {
     if (!seen_[side]) continue;
     ++sides;
     const double old_tail = scale_ * shape_[side].tail;
-    in_ns[side] = learner_[side].decide();
+    in_ns[side] = learner_[side].decide(said[side]);
     in_ns[side].variance = std::max(in_ns[side].variance, least_noise_ * least_noise_);
     product *= in_ns[side].total_variance();
     const bool switched = (old_tail > 0.0) != (in_ns[side].tail > 0.0);

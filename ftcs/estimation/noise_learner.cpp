@@ -105,11 +105,18 @@ bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& sh
 }
 
 template <std::size_t Window>
-DelayShape NoiseLearner<Window>::decide() noexcept {
-  const auto best =
-      static_cast<std::size_t>(std::max_element(ratio_.begin(), ratio_.end()) - ratio_.begin());
-  const double lead =
-      static_cast<double>(ratio_[best]) - kDoubt * std::max(static_cast<double>(spoilt_), 0.0);
+typename NoiseLearner<Window>::Case NoiseLearner<Window>::plead() const noexcept {
+  Case said;
+  for (std::size_t i = 0; i < ratio_.size(); ++i) said.queue[i] = static_cast<double>(ratio_[i]);
+  said.outliers = std::max(static_cast<double>(spoilt_), 0.0);
+  return said;
+}
+
+template <std::size_t Window>
+DelayShape NoiseLearner<Window>::decide(const Case& said) noexcept {
+  const auto best = static_cast<std::size_t>(
+      std::max_element(said.queue.begin(), said.queue.end()) - said.queue.begin());
+  const double lead = said.queue[best] - kDoubt * said.outliers;
   lead_ = static_cast<float>(lead);
   if (has_tail_ ? lead < kTailOff : lead > kTailOn) has_tail_ = !has_tail_;
   if (!has_tail_) return {variance_, 0.0};

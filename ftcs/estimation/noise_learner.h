@@ -44,9 +44,20 @@ class NoiseLearner {
   [[nodiscard]] double count() const noexcept { return count_; }
   [[nodiscard]] double variance() const noexcept { return variance_; }
   [[nodiscard]] bool has_tail() const noexcept { return has_tail_; }
+  /// What speaks for each of three shapes with a queue, against noise and
+  /// outliers, in nats. Two directions that are alike add theirs.
+  struct Case {
+    std::array<double, 3> queue{};
+    double outliers = 0.0;
+    void add(const Case& other) noexcept {
+      for (std::size_t i = 0; i < queue.size(); ++i) queue[i] += other.queue[i];
+      outliers += other.outliers;
+    }
+  };
+  [[nodiscard]] Case plead() const noexcept;
   /// Decides normal or late, with hysteresis, and returns the shape in ns
   /// (scale 1).
-  [[nodiscard]] DelayShape decide() noexcept;
+  [[nodiscard]] DelayShape decide(const Case& said) noexcept;
   /// Probability, roughly, that a learnt tail is none, and the floor of the
   /// delay not where it says.
   [[nodiscard]] double tail_doubt() const noexcept;
@@ -76,7 +87,11 @@ class NoiseLearner<0> {
   [[nodiscard]] bool mature() const noexcept { return false; }
   [[nodiscard]] double count() const noexcept { return 0.0; }
   [[nodiscard]] double variance() const noexcept { return 1.0; }
-  [[nodiscard]] DelayShape decide() noexcept { return {}; }
+  struct Case {
+    void add(const Case&) noexcept {}
+  };
+  [[nodiscard]] Case plead() const noexcept { return {}; }
+  [[nodiscard]] DelayShape decide(const Case&) noexcept { return {}; }
   [[nodiscard]] double tail_doubt() const noexcept { return 0.0; }
 };
 
