@@ -11,7 +11,7 @@
 namespace ftcs::platform {
 namespace {
 
-/// errno of the first call that failed, or 0. Closes the file.
+/// errno of the first call that failed, or 0.
 int write_and_sync(int file, std::string_view content) {
   int code = 0;
   while (!content.empty() && code == 0) {
@@ -23,7 +23,6 @@ int write_and_sync(int file, std::string_view content) {
     }
   }
   if (code == 0 && ::fsync(file) != 0) code = errno;
-  if (::close(file) != 0 && code == 0) code = errno;
   return code;
 }
 
@@ -33,9 +32,31 @@ bool may_be_replaced(const std::string& path) {
   return ::lstat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
 }
 
-void sync_folder_of(const std::string& path) {
+std::string folder_of(const std::string& path) {
   const auto slash = path.rfind('/');
-  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  return slash == std::string::npos ? "." : path.substr(0, slash + 1);
+}
+
+/// A file without a name where the file system has that: a process that is killed while it writes
+/// leaves nothing behind. Else one of the name that `part` becomes.
+int open_part(const std::string& path, std::string& part) {
+  const int file = ::open(folder_of(path).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+  if (file >= 0) return file;
+  part = path + ".XXXXXX";
+  return ::mkostemp(part.data(), O_CLOEXEC);
+}
+
+/// Gives a file without a name one, `part`, for the moment until it is renamed. errno, or 0.
+int name_part(int file, const std::string& path, std::string& part) {
+  const std::string self = "/proc/self/fd/" + std::to_string(file);
+  part = path + "." + std::to_string(::getpid());
+  (void)::unlink(part.c_str());  // of a process with this number that was killed right here
+  return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, part.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0
+                                                                                          : errno;
+}
+
+void sync_folder_of(const std::string& path) {
+  const std::string folder = folder_of(path);
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
   (void)::fsync(descriptor);  // the file is whole either way; only which one may be older
@@ -49,13 +70,15 @@ std::optional<std::string> write_durably(const std::string& path, std::string_vi
     return "cannot write " + path + ": " + std::generic_category().message(code);
   };
   if (!may_be_replaced(path)) return "cannot write " + path + ": it is no regular file";
-  std::string part = path + ".XXXXXX";
-  const int file = ::mkostemp(part.data(), O_CLOEXEC);
+  std::string part;
+  const int file = open_part(path, part);
   if (file < 0) return failure(errno);
   int code = write_and_sync(file, content);
+  if (code == 0 && part.empty()) code = name_part(file, path, part);
+  if (::close(file) != 0 && code == 0) code = errno;
   if (code == 0 && ::rename(part.c_str(), path.c_str()) != 0) code = errno;
   if (code != 0) {
-    (void)::unlink(part.c_str());
+    if (!part.empty()) (void)::unlink(part.c_str());
     return failure(code);
   }
   sync_folder_of(path);
