@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/daemon/follower_record.h"
 
+#include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -236,8 +238,10 @@ std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
       samples_.write(csv_line(record) + "\n");
       break;
   }
-  if (samples_.error() != 0) {
-    return fmt::format("standard output: {}", std::strerror(samples_.error()));
+  if (samples_.error() == EPIPE) return "standard output: nobody reads it any more";
+  if (samples_.error() != 0 && !std::exchange(output_failed_, true)) {
+    log_(LogLevel::kWarning, "standard output: {}; samples are lost, the clock is steered on",
+         std::strerror(samples_.error()));
   }
   if (const std::uint64_t lost = samples_.take_lost(); lost > 0) {
     log_(LogLevel::kWarning, "standard output: {} samples lost, nobody reads them", lost);
@@ -251,13 +255,32 @@ std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
 void FollowerRecord::report_text(const SampleRecord& record,
                                  std::optional<Duration> sync_interval) {
   const std::uint64_t per_summary = samples_per_summary(sync_interval);
+  const auto tell = [&](const std::string& line) {
+    if (!has_room_for_line(record.time_s)) return;
+    if (const auto left_out = std::exchange(lines_left_out_, 0); left_out > 0) {
+      log_(LogLevel::kInfo, "{} lines of samples left out", left_out);
+    }
+    log_(LogLevel::kInfo, "{}", line);
+  };
   if (per_summary < 2 || record.telemetry.verdict != SampleVerdict::kUsed) {
-    log_(LogLevel::kInfo, "{}", ptp4l_line(record));
-    return;
+    return tell(ptp4l_line(record));
   }
-  if (const auto text = summary_.add_recent(record, per_summary)) {
-    log_(LogLevel::kInfo, "{}", *text);
+  if (const auto text = summary_.add_recent(record, per_summary)) tell(*text);
+}
+
+// Who floods us with Syncs floods no log: as many lines a second as summary_interval asks for, or a
+// few.
+bool FollowerRecord::has_room_for_line(double time_s) {
+  constexpr double kFew = 4.0;
+  const double a_second = std::max(kFew, std::exp2(-options_.summary_interval));
+  const double passed = time_s - std::exchange(line_room_at_s_, time_s);
+  line_room_ = std::min(4.0 * a_second, line_room_ + passed * a_second);
+  if (line_room_ < 1.0) {
+    ++lines_left_out_;
+    return false;
   }
+  line_room_ -= 1.0;
+  return true;
 }
 
 // As ptp4l: 2^(summary_interval - logSyncInterval) samples.

@@ -63,12 +63,17 @@ class FollowerRecord {
                                                     std::optional<Duration> sync_interval);
   [[nodiscard]] std::optional<std::string> report(const SampleRecord& record,
                                                   std::optional<Duration> sync_interval);
+  [[nodiscard]] bool has_room_for_line(double time_s);
   void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
   void keep_refusal(const node::Steered& steered, double time_s);
   [[nodiscard]] std::uint64_t samples_per_summary(std::optional<Duration> sync_interval) const;
 
   const PtpOptions& options_;
   Log& log_;
+  bool output_failed_ = false;
+  double line_room_ = 16.0;  ///< for lines of samples
+  double line_room_at_s_ = 0.0;
+  std::uint64_t lines_left_out_ = 0;
   platform::LineWriter samples_{stdout};  ///< as JSON or CSV
   StateKeeper& state_;
   const ClockDiscipline& discipline_;

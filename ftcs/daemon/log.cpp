@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/daemon/log.h"
 
+#include <algorithm>
 #include <ctime>
 #include <string>
 #include <utility>
@@ -16,7 +17,8 @@ bool Log::admits(LogLevel level, const char* kind) {
   const bool from_outside = level == LogLevel::kWarning || level == LogLevel::kNotice;
   if (!from_outside) return true;  // errors end a run, samples have a rate of their own
   constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  const std::int64_t second = kernel_.clock_ns(CLOCK_MONOTONIC) / kNsPerSecond;
+  const std::int64_t now_ns = kernel_.clock_ns(CLOCK_MONOTONIC);
+  const std::int64_t second = now_ns / kNsPerSecond;
   Kind& known = kinds_[kind];
   if (known.second != second) {
     const std::uint64_t left_out = std::exchange(known.left_out, 0);
@@ -24,9 +26,26 @@ bool Log::admits(LogLevel level, const char* kind) {
     known.told = 0;
     if (left_out > 0) write(level, fmt::format("{} lines of the next kind left out", left_out));
   }
-  if (++known.told <= kMostASecond) return true;
-  ++known.left_out;
-  return false;
+  if (++known.told > kMostASecond) {
+    ++known.left_out;
+    return false;
+  }
+  return has_room(now_ns);
+}
+
+bool Log::has_room(std::int64_t now_ns) {
+  const double passed_s = static_cast<double>(now_ns - std::exchange(room_at_ns_, now_ns)) * 1e-9;
+  room_ = std::min<double>(kMostAtOnce, room_ + passed_s * kAllASecond);
+  if (room_ < 1.0) {
+    ++left_out_;
+    return false;
+  }
+  room_ -= 1.0;
+  if (const std::uint64_t left_out = std::exchange(left_out_, 0); left_out > 0) {
+    room_ -= 1.0;
+    write(LogLevel::kWarning, fmt::format("{} lines of several kinds left out", left_out));
+  }
+  return true;
 }
 
 void Log::write(LogLevel level, std::string_view text) {

@@ -24,6 +24,9 @@ enum class LogLevel : std::uint8_t { kError = 3, kWarning = 4, kNotice = 5, kInf
 class Log {
  public:
   static constexpr int kMostASecond = 10;
+  /// Of all kinds together, after as many as a start has.
+  static constexpr int kMostAtOnce = 40;
+  static constexpr int kAllASecond = 5;
 
   Log(platform::Kernel& kernel, std::FILE* stream, int level);
 
@@ -45,6 +48,7 @@ class Log {
   };
   /// `kind`: the place of its format string.
   [[nodiscard]] bool admits(LogLevel level, const char* kind);
+  [[nodiscard]] bool has_room(std::int64_t now_ns);
   void write(LogLevel level, std::string_view text);
 
   platform::Kernel& kernel_;
@@ -52,6 +56,9 @@ class Log {
   platform::LineWriter errors_;
   int level_;
   std::map<const char*, Kind> kinds_{};
+  double room_ = kMostAtOnce;  ///< for lines of all kinds
+  std::int64_t room_at_ns_ = 0;
+  std::uint64_t left_out_ = 0;
   std::uint64_t lost_ = 0;
 };
 

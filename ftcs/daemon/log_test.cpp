@@ -63,6 +63,22 @@ TEST_F(LogTest, a_flood_is_told_ten_times_a_second_and_how_much_was_left_out) {
   EXPECT_NE(text.find("240 lines of the next kind left out"), std::string::npos) << text;
 }
 
+TEST_F(LogTest, a_flood_of_many_kinds_is_no_more_lines) {
+  const auto flood = [this](int seconds) {
+    for (int n = 0; n < 10 * seconds; ++n) {
+      (*log)(LogLevel::kWarning, "one");
+      (*log)(LogLevel::kWarning, "two");
+      (*log)(LogLevel::kNotice, "three");
+      kernel.advance(100'000'000);
+    }
+    return lines(read());
+  };
+  flood(10);  // what a start has room for is used up
+  const auto told = flood(60);
+  EXPECT_LE(told, 340) << "five a second, and what was kept for a start";
+  EXPECT_GE(told, 250);
+}
+
 TEST_F(LogTest, samples_are_as_many_as_were_asked_for) {
   for (int i = 0; i < 128; ++i) (*log)(LogLevel::kInfo, "offset {}", i);
   EXPECT_EQ(lines(read()), 128);

@@ -36,11 +36,7 @@ class ManagementClient {
   [[nodiscard]] std::optional<Data> ask_and_wait(ptp::ManagementId id, int patience_ms) {
     ask(id);
     for (int i = 0; i < kMostAnswers; ++i) {
-      auto answer = next_answer();
-      if (!answer) {
-        socket_.wait(patience_ms);
-        answer = next_answer();
-      }
+      const auto answer = wait_for_answer(patience_ms);
       if (!answer) break;
       if (const auto* data = std::get_if<Data>(&*answer)) return *data;
     }
@@ -50,13 +46,19 @@ class ManagementClient {
   [[nodiscard]] int descriptor() const { return socket_.descriptor(); }
 
  private:
+  /// Answers to so many of the last questions are taken; no others were asked for.
+  static constexpr std::uint16_t kAwaited = 64;
   static constexpr int kMostAnswers = 64;  // a boundary clock answers for each of its ports
 
   ManagementClient(PortAddress address, platform::LocalSocket socket)
       : address_(std::move(address)), socket_(std::move(socket)) {}
 
+  /// Datagrams that are no answers do not end the wait, nor prolong it.
+  [[nodiscard]] std::optional<ptp::ManagementData> wait_for_answer(int patience_ms);
+
   PortAddress address_;
   platform::LocalSocket socket_;
+  std::uint16_t asked_ = 0;  ///< the last question's sequence id; the first one's is 1
 };
 
 }  // namespace ftcs::daemon

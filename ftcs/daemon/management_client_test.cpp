@@ -17,19 +17,27 @@ using platform::LocalSocket;
 constexpr int kPatienceMs = 20;
 constexpr std::uint8_t kPeerToPeer = 2;
 
-std::string receive_question(LocalSocket& ptp4l) {
+struct Question {
+  std::string sender;
+  std::uint16_t sequence_id = 0;
+};
+
+Question receive_question(LocalSocket& ptp4l) {
   ptp4l.wait(10'000);
-  const auto question = ptp4l.receive();
-  return question ? question->sender : std::string{};
+  const auto datagram = ptp4l.receive();
+  if (!datagram) return {};
+  const auto message = ptp::decode_management(datagram->bytes);
+  return {datagram->sender, message ? message->header.sequence_id : std::uint16_t{0}};
 }
 
-void answer(LocalSocket& ptp4l, const std::string& client, ptp::ManagementId id,
+void answer(LocalSocket& ptp4l, const Question& question, ptp::ManagementId id,
             const ptp::ManagementData& data) {
   ptp::ManagementMessage message;
+  message.header.sequence_id = question.sequence_id;
   message.body.action = static_cast<std::uint8_t>(ptp::ManagementAction::kResponse);
   message.id = id;
   message.data = data;
-  EXPECT_FALSE(ptp4l.send(client, ptp::encode_management(message).view()));
+  EXPECT_FALSE(ptp4l.send(question.sender, ptp::encode_management(message).view()));
 }
 
 TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) {
@@ -45,13 +53,16 @@ TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) 
                                                            kPatienceMs));
 
   std::thread late([&] {
-    const std::string asker = receive_question(*ptp4l);
-    EXPECT_EQ(receive_question(*ptp4l), asker);
-    answer(*ptp4l, asker, ptp::ManagementId::kPortPropertiesNp, ptp::PortPropertiesNp{});
+    const Question first = receive_question(*ptp4l);
+    const Question second = receive_question(*ptp4l);
+    EXPECT_EQ(second.sender, first.sender);
+    answer(*ptp4l, first, ptp::ManagementId::kPortPropertiesNp, ptp::PortPropertiesNp{});
     std::this_thread::sleep_for(std::chrono::milliseconds{kPatienceMs});
     ptp::PortDataSet port;
     port.delay_mechanism = kPeerToPeer;
-    answer(*ptp4l, asker, ptp::ManagementId::kPortDataSet, port);
+    // Anybody can write to a socket: what was not asked is no answer.
+    answer(*ptp4l, {second.sender, 999}, ptp::ManagementId::kPortDataSet, ptp::PortDataSet{});
+    answer(*ptp4l, second, ptp::ManagementId::kPortDataSet, port);
   });
   const auto port =
       client->ask_and_wait<ptp::PortDataSet>(ptp::ManagementId::kPortDataSet, 50 * kPatienceMs);

@@ -62,6 +62,7 @@ std::optional<ReceiverEvent> ReceiverNode::next() noexcept {
   for (;;) {
     if (const auto event = follower_.next()) {
       if (const auto* steered = std::get_if<Steered>(&*event)) count_refusals(steered->telemetry);
+      if (const auto* told = std::get_if<Note>(&*event)) heed(*told);
       return std::visit([](const auto& told) { return ReceiverEvent{told}; }, *event);
     }
     if (std::exchange(pair_was_fed_, false)) tell_port_of_pair(now_);
@@ -91,6 +92,13 @@ bool ReceiverNode::keeps(const ptp::Action& action) noexcept {
     follower_.on_reference_jump(jumped->jump);
   }
   return false;
+}
+
+// Holdover although Syncs come: they tell nothing that could be followed.
+void ReceiverNode::heed(const Note& told) noexcept {
+  if (told.kind != NoteKind::kHoldover || told.refused_syncs < kRefusalsToDoubt) return;
+  refusals_ = kRefusalsToDoubt;
+  pair_was_fed_ = true;
 }
 
 void ReceiverNode::count_refusals(const Telemetry& telemetry) noexcept {

@@ -80,6 +80,7 @@ class ReceiverNode {
  private:
   void take(const ptp::ActionList& actions, FreeRunningTime now) noexcept;
   [[nodiscard]] bool keeps(const ptp::Action& action) noexcept;
+  void heed(const Note& told) noexcept;
   void count_refusals(const Telemetry& telemetry) noexcept;
   void tell_port_of_lock(FreeRunningTime now) noexcept;
   void tell_port_of_pair(FreeRunningTime now) noexcept;

@@ -139,8 +139,9 @@ std::optional<OsError> ClockDevice::hold() {
   if (clock.empty()) return std::nullopt;
   const int held = kernel_->hold_name(("ftcs clock " + clock).c_str());
   if (held == -EADDRINUSE) return busy();
-  if (held < 0) return std::nullopt;
-  hold_ = Descriptor(*kernel_, held);
+  if (held < 0 && held != -EPERM) return std::nullopt;
+  if (held >= 0)
+    hold_ = Descriptor(*kernel_, held);  // else a stranger has the name: the file counts
   const std::string path = "/run/ftcs-clock-" + clock + ".lock";
   const int file = kernel_->open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW);
   if (file < 0) return std::nullopt;

@@ -3,11 +3,15 @@
 // are meant; no clock of it is opened.
 #include "ftcs/platform/clock_device.h"
 
+#include <cstddef>
 #include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
 #include <string>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -131,6 +135,22 @@ TEST(ClockDevice, a_name_of_this_host_is_held_by_one_process) {
   }
   const Descriptor again(kernel, kernel.hold_name(name.c_str()));
   EXPECT_TRUE(again.is_open()) << "free again once it is closed";
+}
+
+// Anybody may bind a public name: root's clock was then "already in use".
+TEST(ClockDevice, a_name_that_somebody_else_took_is_told_apart) {
+  LinuxKernel kernel;
+  const std::string name =
+      "ftcs test of a stranger " + std::to_string(kernel.clock_ns(CLOCK_MONOTONIC));
+  const int stranger = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (stranger < 0) GTEST_SKIP() << "no UNIX sockets here";
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  name.copy(address.sun_path + 1, sizeof address.sun_path - 1);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  ASSERT_EQ(::bind(stranger, reinterpret_cast<const sockaddr*>(&address), size), 0);
+  EXPECT_EQ(kernel.hold_name(name.c_str()), -EPERM) << "none of ours listens there";
+  ::close(stranger);
 }
 
 TEST(ClockDevice, missing_rights_are_found_without_touching_the_clock) {

@@ -249,10 +249,9 @@ std::optional<EthercatLink::Received> EthercatLink::receive(FreeRunningTime dead
                                                             bool spin) noexcept {
   while (true) {
     if (auto received = read_one()) return received;
-    if (spin) {
-      if (HostClock::now() >= deadline) return std::nullopt;
-      continue;
-    }
+    // However many frames of others come.
+    if (HostClock::now() >= deadline) return std::nullopt;
+    if (spin) continue;
     if (!wait_readable(deadline)) return std::nullopt;
     drain_errors();
   }

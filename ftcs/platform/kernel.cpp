@@ -92,19 +92,35 @@ int LinuxKernel::set_timer(int fd, std::int64_t from_now_ns) noexcept {
   return or_errno(::timerfd_settime(fd, 0, &when, nullptr));
 }
 
-// An abstract UNIX address: nothing stays behind in a file system.
+namespace {
+
+/// Whether who listens there is root or of our own user: anybody may take a name that is public.
+bool is_held_by_ours(int fd, const sockaddr* address, socklen_t size) {
+  if (::connect(fd, address, size) < 0) return errno == EAGAIN;  // a full queue is somebody's
+  ucred holder{};
+  socklen_t length = sizeof holder;
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &holder, &length) != 0) return true;
+  return holder.uid == 0 || holder.uid == ::geteuid();
+}
+
+}  // namespace
+
+// An abstract UNIX address: nothing stays behind in a file system. Listening tells whose it is.
 int LinuxKernel::hold_name(const char* name) noexcept {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::size_t length = std::min(std::strlen(name), sizeof address.sun_path - 1);
   std::memcpy(address.sun_path + 1, name, length);
-  const int fd = socket(AF_UNIX, SOCK_DGRAM);
+  const int fd = or_errno(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (fd < 0) return fd;
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
-  const int bound = or_errno(::bind(fd, reinterpret_cast<const sockaddr*>(&address), size));
-  if (bound >= 0) return fd;
+  const auto* const place = reinterpret_cast<const sockaddr*>(&address);
+  int held = or_errno(::bind(fd, place, size));
+  if (held >= 0) held = or_errno(::listen(fd, 1));
+  if (held >= 0) return fd;
+  if (held == -EADDRINUSE && !is_held_by_ours(fd, place, size)) held = -EPERM;
   close(fd);
-  return bound;
+  return held;
 }
 
 int LinuxKernel::lock(int fd) noexcept { return or_errno(::flock(fd, LOCK_EX | LOCK_NB)); }

@@ -106,10 +106,14 @@ std::optional<FreeRunningTime> ForeignTransmitters::last_heard(
   return record->last;
 }
 
-void ForeignTransmitters::doubt(const PortIdentity& port, FreeRunningTime now) noexcept {
+bool ForeignTransmitters::doubt(const PortIdentity& port, FreeRunningTime now) noexcept {
+  bool anew = false;
   for (Record& record : records_) {
-    if (record.used && record.data.port == port) record.doubted_until = now + Duration{kDoubtTime};
+    if (!record.used || record.data.port != port) continue;
+    anew = !record.doubted_until || now >= *record.doubted_until;
+    record.doubted_until = now + Duration{kDoubtTime};
   }
+  return anew;
 }
 
 void ForeignTransmitters::forget(const PortIdentity& port) noexcept {

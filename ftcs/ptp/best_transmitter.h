@@ -46,7 +46,8 @@ class ForeignTransmitters {
 
   /// What was refused is worse than any other for so long, or until it has fallen silent.
   static constexpr Nanoseconds kDoubtTime{300'000'000'000};
-  void doubt(const PortIdentity& port, FreeRunningTime now) noexcept;
+  /// False: it is doubted already, or unknown.
+  bool doubt(const PortIdentity& port, FreeRunningTime now) noexcept;
   void forget(const PortIdentity& port) noexcept;
   void clear() noexcept { records_ = {}; }
 

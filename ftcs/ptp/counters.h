@@ -58,10 +58,12 @@ enum class Counter : std::uint8_t {
   kWrongChannel,   ///< event message without a receive stamp, as it came on the general port
   kNotListening,   ///< while initializing, faulty or without a selected transmitter
   // Order and loss of Sync and Follow_Up.
-  kMissedSync,         ///< gaps in the sequence; nothing to do
-  kDuplicateSync,      ///< second copy dropped
-  kDuplicateFollowUp,  ///< second copy dropped
-  kStaleSync,          ///< older than one that came before: dropped
+  kMissedSync,             ///< gaps in the sequence; nothing to do
+  kDuplicateSync,          ///< second copy dropped
+  kDuplicateFollowUp,      ///< second copy dropped
+  kEarlyFollowUp,          ///< before its Sync, while somebody forges such: dropped
+  kContradictingFollowUp,  ///< tells another time than an early one before it: dropped, as above
+  kStaleSync,              ///< older than one that came before: dropped
   kStaleFollowUp,     ///< its pair would be older than one already emitted, or its Sync is unknown:
                       ///< dropped
   kSequenceRestarts,  ///< a leap of the sequence, as after a restart: unmatched messages are

@@ -46,9 +46,14 @@ std::optional<EventPair> SyncMatcher::on_follow_up(const Header& header, const F
   Slot* slot = find(header.sequence_id);
   if (slot != nullptr && slot->state != SlotState::kSyncWaits) {
     counters.add(Counter::kDuplicateFollowUp);
+    look_for_forgery(*slot, header, follow_up, now, counters);
     return std::nullopt;
   }
   const bool sync_waits = slot != nullptr;
+  if (!sync_waits && forged_at_ && now - *forged_at_ < Duration{kForgeryMemory}) {
+    counters.add(Counter::kEarlyFollowUp);
+    return std::nullopt;
+  }
   if (!sync_waits) {
     const int distance = sequence_distance(header.sequence_id, newest_id_);
     if (has_newest_ && distance <= 0 && distance > -kReorderWindow) {
@@ -57,11 +62,22 @@ std::optional<EventPair> SyncMatcher::on_follow_up(const Header& header, const F
     }
     slot = &take_slot(header.sequence_id, now, counters);
     slot->state = SlotState::kFollowUpWaits;
+    slot->follow_up_first = true;
+    slot->follow_up = follow_up.precise_origin + header.correction;
   }
   slot->origin = follow_up.precise_origin;
   slot->correction += header.correction;
   if (sync_waits) return complete(*slot, counters);
   return std::nullopt;
+}
+
+void SyncMatcher::look_for_forgery(const Slot& slot, const Header& header,
+                                   const FollowUp& follow_up, FreeRunningTime now,
+                                   Counters& counters) noexcept {
+  if (!slot.follow_up_first) return;
+  if (slot.follow_up == follow_up.precise_origin + header.correction) return;  // a copy
+  counters.add(Counter::kContradictingFollowUp);
+  forged_at_ = now;
 }
 
 bool SyncMatcher::admit_sync(std::uint16_t sequence_id, FreeRunningTime now,

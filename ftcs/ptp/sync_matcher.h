@@ -50,9 +50,15 @@ class SyncMatcher {
     FreeRunningTime received{};
     ReferenceTime origin{};
     Duration correction{};
+    bool follow_up_first = false;  ///< and its time, follow_up
+    ReferenceTime follow_up{};
     bool overtaken = false;  ///< admitted although a newer id had come, or after such a one
   };
   static constexpr std::size_t kRemembered = 256;  // at 128 Hz two seconds
+  /// Follow_Ups that come before their Sync are usual where the two are read from two sockets. Once
+  /// a second one for the same Sync tells another time, somebody forges them: then only those count
+  /// that come after the Sync, until none has been contradicted for so long.
+  static constexpr Nanoseconds kForgeryMemory{60'000'000'000};
   /// Four Syncs may be under way at once.
   static constexpr std::size_t kSlots = 4;
 
@@ -66,6 +72,8 @@ class SyncMatcher {
   std::optional<EventPair> complete(Slot& slot, Counters& counters) noexcept;
   void expire(FreeRunningTime now, Counters& counters) noexcept;
   static void release(Slot& slot, Counters& counters) noexcept;
+  void look_for_forgery(const Slot& slot, const Header& header, const FollowUp& follow_up,
+                        FreeRunningTime now, Counters& counters) noexcept;
 
   std::array<Slot, kSlots> slots_{};
   bool has_newest_ = false;
@@ -81,6 +89,7 @@ class SyncMatcher {
   std::uint16_t emitted_id_ = 0;
   ReferenceTime emitted_{};
   bool overtaken_ = false;  ///< the newest
+  std::optional<FreeRunningTime> forged_at_{};
 };
 
 }  // namespace ftcs::ptp

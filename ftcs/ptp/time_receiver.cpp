@@ -156,8 +156,8 @@ ActionList TimeReceiver::on_servo_unlocked(FreeRunningTime) noexcept {
 ActionList TimeReceiver::on_transmitter_doubted(FreeRunningTime now) noexcept {
   ActionList actions;
   if (!has_transmitter_) return actions;
+  if (!foreign_.doubt(transmitter_.port, now)) return actions;
   port_.count(Counter::kDoubtedTransmitters);
-  foreign_.doubt(transmitter_.port, now);
   port_.push(TransmitterDoubted{transmitter_.port}, actions);
   decide(now, actions);
   return actions;

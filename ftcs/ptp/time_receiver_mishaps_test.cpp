@@ -478,6 +478,23 @@ TEST_F(Receiver, syncs_that_contradict_the_others_one_by_one_or_in_a_burst_are_n
   EXPECT_EQ(count(Counter::kDoubtedTime), 100U + 40U);
 }
 
+// A forged Follow_Up that is there before the Sync took the true one's place: 431 us while locked.
+TEST_F(Receiver, follow_ups_before_their_sync_count_until_one_is_contradicted) {
+  select_a();
+  std::size_t forged = 0;
+  for (std::uint16_t i = 0; i < 40; ++i) {
+    const Nanoseconds sent = 1s + i * 125ms;
+    static_cast<void>(general(follow_up(i, sent + 300us), sent - 1ms));
+    const auto early = of<EmitPair>(event(sync_from(kA, i), sent + kDelay));
+    const auto late = of<EmitPair>(general(follow_up(i, sent), sent + 2 * kDelay));
+    forged += early.size();
+    EXPECT_EQ(late.size(), i == 0 ? 0U : 1U) << i;
+  }
+  EXPECT_EQ(forged, 1U) << "the first, before anybody could know";
+  EXPECT_EQ(count(Counter::kContradictingFollowUp), 1U);
+  EXPECT_EQ(count(Counter::kEarlyFollowUp), 39U);
+}
+
 TEST_F(Receiver, an_answer_an_hour_off_is_no_delay) {
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;

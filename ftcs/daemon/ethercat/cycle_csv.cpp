@@ -3,8 +3,9 @@
 
 #include <array>
 #include <cerrno>
-#include <filesystem>
+#include <sys/stat.h>
 #include <system_error>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -19,11 +20,11 @@ std::optional<WriteError> CycleCsv::open(const std::string& path) {
 
 void CycleCsv::begin() {
   if (!is_open()) return;
-  std::error_code problem;
-  if (std::filesystem::is_regular_file(path_, problem)) {
-    std::filesystem::resize_file(path_, 0, problem);
-    errno = problem.value();
-    check(!problem);
+  // The file that was opened, whatever stands at its name by now.
+  const int descriptor = ::fileno(file_.get());
+  struct stat status {};
+  if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode)) {
+    check(::ftruncate(descriptor, 0) == 0);
   }
   constexpr const char* kHeader =
       "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,working_counter,"
