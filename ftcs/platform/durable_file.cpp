@@ -85,4 +85,11 @@ std::optional<std::string> write_durably(const std::string& path, std::string_vi
   return std::nullopt;
 }
 
+bool cut_to_nothing(std::FILE* file) {
+  const int descriptor = ::fileno(file);
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) return false;
+  return !S_ISREG(status.st_mode) || ::ftruncate(descriptor, 0) == 0;
+}
+
 }  // namespace ftcs::platform

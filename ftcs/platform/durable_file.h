@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,5 +15,9 @@ namespace ftcs::platform {
 /// or a link is not replaced. Returns what failed, with the system's reason.
 [[nodiscard]] std::optional<std::string> write_durably(const std::string& path,
                                                        std::string_view content);
+
+/// A regular file that is open, whatever stands at its name by now; anything else stays as it is.
+/// False with errno: it could not be cut.
+[[nodiscard]] bool cut_to_nothing(std::FILE* file);
 
 }  // namespace ftcs::platform

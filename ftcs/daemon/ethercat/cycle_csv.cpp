@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cerrno>
-#include <sys/stat.h>
 #include <system_error>
-#include <unistd.h>
 
 #include <fmt/format.h>
+
+#include "ftcs/platform/durable_file.h"
 
 namespace ftcs::daemon {
 
@@ -21,11 +21,7 @@ std::optional<WriteError> CycleCsv::open(const std::string& path) {
 void CycleCsv::begin() {
   if (!is_open()) return;
   // The file that was opened, whatever stands at its name by now.
-  const int descriptor = ::fileno(file_.get());
-  struct stat status {};
-  if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode)) {
-    check(::ftruncate(descriptor, 0) == 0);
-  }
+  check(platform::cut_to_nothing(file_.get()));
   constexpr const char* kHeader =
       "cycle,state,verdict,phase_error_ns,lateness_ns,round_trip_ns,rate_ppb,working_counter,"
       "margin_ns,skipped,bus_state,dc_to_plant_ns,dc_to_plant_sigma_ns,bus_rate_ppb,compared_drive,"
