@@ -52,13 +52,18 @@ enum ftcs_addend_error {
   FTCS_ADDEND_BAD_GAIN = 3,  /* above 65536 */
   FTCS_ADDEND_BAD_BAND =
       4, /* band_leave_ns below band_enter_ns, or lock_leave_ns below lock_enter_ns */
-  FTCS_ADDEND_BAD_TIME = 5, /* negative, above an hour, or T_c longer than a given T */
-  FTCS_ADDEND_BAD_MEMORY =
-      6, /* quiet_memory of 1 to 7, above 255, or quiet mode is not compiled in */
-  FTCS_ADDEND_BAD_ADDEND = 7 /* addend_now outside nominal (1 +- F) */
+  FTCS_ADDEND_BAD_TIME = 5,   /* negative, above an hour, or T_c longer than a given T */
+  FTCS_ADDEND_BAD_MEMORY = 6, /* a filter with a quiet_memory below 8 or above 255 */
+  FTCS_ADDEND_BAD_ADDEND = 7  /* addend_now outside nominal (1 +- F) */
 };
 
 #define FTCS_ADDEND_UNBOUNDED UINT32_MAX /* as band: every offset lies inside */
+
+struct ftcs_addend_servo;
+
+/* Private, but for its name: what the rate is taken from. Zero rejects the sample. */
+typedef int32_t (*ftcs_addend_filter)(struct ftcs_addend_servo* servo, int64_t shown,
+                                      int64_t* ahead);
 
 /* Must outlive the servo: a constant in flash. */
 typedef struct ftcs_addend_config {
@@ -71,13 +76,14 @@ typedef struct ftcs_addend_config {
   uint32_t band_leave_ns;  /* ... left at this offset */
   uint32_t lock_enter_ns;
   uint32_t lock_leave_ns;
+  uint32_t step_ns; /* the first action steps the clock if the offset is that large; zero: never */
   int64_t interval_ns;   /* [T_sync] zero: measured, the shorter of the last two gaps */
   int64_t correction_ns; /* [T_c] zero: T_sync */
-  int64_t step_ns; /* the first action steps the clock if the offset is that large; zero: never */
-  uint16_t dwell;  /* consecutive offsets inside the band, after the first action, before p holds */
-  uint16_t quiet_memory; /* zero: FTCS; 8 to 255: quiet mode */
+  uint16_t dwell; /* consecutive offsets inside the band, after the first action, before p holds */
+  uint16_t quiet_memory; /* of the filter, in samples, 8 to 255 */
   uint32_t
       no_timer; /* non-zero: nobody writes next_addend, a correction holds until the next command */
+  ftcs_addend_filter filter; /* zero: FTCS; ftcs_addend_quiet: quiet mode */
 } ftcs_addend_config;
 
 typedef struct ftcs_addend_sample {
@@ -103,51 +109,57 @@ typedef struct ftcs_addend_command {
   int64_t offset_ns; /* of the sample, local minus reference, saturated at +- 2^44 ns */
 } ftcs_addend_command;
 
-/* A number below 4 in magnitude, m 2^-shift: m in the upper half, then its sign and the shift.
- * Private. */
-typedef uint64_t ftcs_addend_ratio;
+/* A number r of magnitude at most 4 as m 2^-(29 + shift), |m| < 2^31: m in the upper half, the
+ * shift (0 to 63) in the lower. Private. */
+typedef int64_t ftcs_addend_ratio;
 
 /* One servo; its content is private. */
 typedef struct ftcs_addend_servo {
   const ftcs_addend_config* config;
   uint32_t slowest; /* addends: F */
   uint32_t fastest;
-  uint32_t plausible;           /* distance from nominal */
-  ftcs_addend_ratio per_addend; /* 1 / nominal */
-  uint32_t addend;              /* W(n), tracking */
-  int64_t origin_ns;            /* of the last sample */
+  uint32_t lowest; /* addends: plausible */
+  uint32_t highest;
+  int64_t origin_ns; /* of the last sample */
   int64_t local_ns;
   int64_t interval; /* between the last two samples, 2^-16 ns; zero: there were none */
   int64_t start_ns; /* the clock showed this when the correction began; 2^-16 ns from here on: */
   int64_t length;   /* what it shows until the correction ends */
   int64_t before_start;         /* from the last sample to start_ns, at the rate of W(n) */
   ftcs_addend_ratio shortening; /* (W - C) / C: a time shown at C, in time at W */
-  ftcs_addend_ratio earlier;    /* the same, near enough, of what held before start_ns */
+  int64_t residue;              /* filtered minus measured reference of the last sample */
+  uint32_t addend;              /* W(n), tracking */
+  int32_t fraction;             /* wanted minus written tracking addend, 2^-16 */
+  uint32_t deviation;           /* mean of magnitudes, 1/16 ns */
   uint16_t origin_fraction;
   uint16_t local_fraction;
-  uint16_t inside; /* offsets below band_enter_ns in a row */
-  uint8_t phase;
-  uint8_t converged;
-  uint8_t locked;
-  int32_t fraction;   /* wanted minus written tracking addend, 2^-16 */
-  uint32_t deviation; /* mean of magnitudes, 1/16 ns */
-#ifndef FTCS_ADDEND_WITHOUT_QUIET
-  int64_t residue;   /* filtered minus measured reference of the last sample, 2^-16 ns */
+  uint16_t inside;   /* offsets below band_enter_ns in a row */
   uint16_t memory;   /* samples the filter remembers */
   int16_t whiteness; /* mean product of the signs of successive innovations, 256 is 1 */
-  uint8_t last_sign;
-  uint8_t doubted;
-#endif
+  uint8_t phase;
+  uint8_t locked;
+  uint8_t last; /* innovation: its sign, and whether it was doubted */
 } ftcs_addend_servo;
 
 /* FTCS with the defaults of the C++ servo: p = 1/16, B unbounded, F and plausible rates +- 50 % or
  * what fits 32 bits, lock at 1 us, left at 5 us, nothing steps. */
 ftcs_addend_config ftcs_addend_default_config(uint32_t nominal_addend);
 
+/* The same in quiet mode: p = 1, a memory of at most 64 samples. */
+ftcs_addend_config ftcs_addend_quiet_config(uint32_t nominal_addend);
+
+/* For config.filter; with it in no configuration, the linker leaves quiet mode out. */
+int32_t ftcs_addend_quiet(ftcs_addend_servo* servo, int64_t shown, int64_t* ahead);
+
 /* `addend_now` is what the register holds. Returns an enum ftcs_addend_error; the servo is usable
  * after FTCS_ADDEND_OK. */
 int32_t ftcs_addend_init(ftcs_addend_servo* servo, const ftcs_addend_config* config,
                          uint32_t addend_now);
+
+/* The same for a configuration that has been found good, by ftcs_addend_init() in a test or as a
+ * program starts: 200 bytes less. */
+void ftcs_addend_start(ftcs_addend_servo* servo, const ftcs_addend_config* config,
+                       uint32_t addend_now);
 
 /* Everything measured is void: the next command comes with the second sample. The register is left
  * alone. */
@@ -158,7 +170,16 @@ void ftcs_addend_reset(ftcs_addend_servo* servo);
 void ftcs_addend_prime(ftcs_addend_servo* servo, const ftcs_addend_sample* sample);
 
 /* The command of one sample; it is taken as obeyed at now_ns and until_ns. */
-ftcs_addend_command ftcs_addend_update(ftcs_addend_servo* servo, const ftcs_addend_sample* sample);
+void ftcs_addend_take(ftcs_addend_servo* servo, const ftcs_addend_sample* sample,
+                      ftcs_addend_command* command);
+
+/* The same as a value. */
+static inline ftcs_addend_command ftcs_addend_update(ftcs_addend_servo* servo,
+                                                     const ftcs_addend_sample* sample) {
+  ftcs_addend_command command;
+  ftcs_addend_take(servo, sample, &command);
+  return command;
+}
 
 /* What really happened, if it differs: the registers were written when the clock showed `at_ns`,
  * with addends that the actuator could realise. Call before the next sample. */

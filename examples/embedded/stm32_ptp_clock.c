@@ -14,9 +14,19 @@ enum { TSE = 1, TSFCU = 2, TSSTI = 4, TSSTU = 8, TSITE = 16, TSARU = 32, TSSSR =
 #define NOMINAL 0x4C30C30CU /* ftcs_addend32_nominal(HCLK_HZ, INCREMENT_NS) */
 
 static const ftcs_addend_config config = {
-    NOMINAL, 100000, 100000, 4096,    FTCS_ADDEND_UNBOUNDED, FTCS_ADDEND_UNBOUNDED, 1000,
-    5000,    0,      0,      1000000, /* a first offset of a millisecond or more is stepped */
-    1,       64,     0};
+    .nominal_addend = NOMINAL,
+    .limit_ppm = 100000,
+    .plausible_ppm = 100000,
+    .gain_q16 = 65536,
+    .band_enter_ns = FTCS_ADDEND_UNBOUNDED,
+    .band_leave_ns = FTCS_ADDEND_UNBOUNDED,
+    .lock_enter_ns = 1000,
+    .lock_leave_ns = 5000,
+    .step_ns = 1000000, /* a first offset of a millisecond or more is stepped */
+    .dwell = 1,
+    .filter = ftcs_addend_quiet,
+    .quiet_memory = 64,
+};
 static ftcs_addend_servo servo;
 static const ftcs_addend32 mac = {&ETH_PTP[TSAR], &ETH_PTP[TSCR], &ETH_PTP[TTHR],
                                   &ETH_PTP[TTLR], TSARU,          TSITE};

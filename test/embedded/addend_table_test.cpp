@@ -43,9 +43,7 @@ Outcome run(std::int64_t interval_ms, Control&& control) {
   return outcome;
 }
 
-Outcome run_addend(std::int64_t interval_ms, std::uint16_t quiet_memory) {
-  ftcs_addend_config config = ftcs_addend_default_config(Plant::kNominal);
-  config.quiet_memory = quiet_memory;
+Outcome run_addend(std::int64_t interval_ms, const ftcs_addend_config& config) {
   ftcs_addend_servo servo;
   EXPECT_EQ(ftcs_addend_init(&servo, &config, Plant::kNominal), FTCS_ADDEND_OK);
   return run(interval_ms, [&servo](Plant& plant) {
@@ -77,7 +75,7 @@ constexpr std::int64_t kIntervals[] = {31, 125, 250, 500, 1000, 2000, 4000};
 
 TEST(AddendTable, ftcs_is_within_300_ns_from_the_second_sample_on_at_every_interval) {
   for (const auto interval : kIntervals) {
-    const Outcome ftcs = run_addend(interval, 0);
+    const Outcome ftcs = run_addend(interval, ftcs_addend_default_config(Plant::kNominal));
     print("ftcs_addend", interval, ftcs);
     EXPECT_LE(ftcs.within_from, 2) << interval;
     EXPECT_LT(ftcs.rms, 45.0) << interval;
@@ -86,7 +84,7 @@ TEST(AddendTable, ftcs_is_within_300_ns_from_the_second_sample_on_at_every_inter
 
 TEST(AddendTable, quiet_mode_locks_as_fast_and_settles_at_a_third_of_the_noise) {
   for (const auto interval : kIntervals) {
-    const Outcome quiet = run_addend(interval, 64);
+    const Outcome quiet = run_addend(interval, ftcs_addend_quiet_config(Plant::kNominal));
     print("ftcs_addend, quiet", interval, quiet);
     EXPECT_LE(quiet.within_from, 2) << interval;
     EXPECT_LT(quiet.rms, 12.0) << interval;

@@ -34,11 +34,7 @@ struct Node {
 };
 
 ftcs_addend_config plain() { return ftcs_addend_default_config(Plant::kNominal); }
-ftcs_addend_config quiet() {
-  ftcs_addend_config config = plain();
-  config.quiet_memory = 64;
-  return config;
-}
+ftcs_addend_config quiet() { return ftcs_addend_quiet_config(Plant::kNominal); }
 
 TEST(AddendServo, removes_a_millisecond_and_fifty_ppm_in_one_interval_and_says_that_it_is_locked) {
   Plant plant(kInterval, 50'000.0, 1'000'000, 0.0);
@@ -265,11 +261,21 @@ TEST(AddendServo, refuses_each_configuration_that_it_cannot_keep) {
   EXPECT_EQ(error([](auto& c) { c.lock_leave_ns = 1; }), FTCS_ADDEND_BAD_BAND);
   EXPECT_EQ(error([](auto& c) { c.interval_ns = -1; }), FTCS_ADDEND_BAD_TIME);
   EXPECT_EQ(error([](auto& c) { c.interval_ns = 10, c.correction_ns = 11; }), FTCS_ADDEND_BAD_TIME);
-  EXPECT_EQ(error([](auto& c) { c.quiet_memory = 7; }), FTCS_ADDEND_BAD_MEMORY);
-  EXPECT_EQ(error([](auto& c) { c.quiet_memory = 256; }), FTCS_ADDEND_BAD_MEMORY);
+  EXPECT_EQ(error([](auto& c) { c = quiet(), c.quiet_memory = 7; }), FTCS_ADDEND_BAD_MEMORY);
+  EXPECT_EQ(error([](auto& c) { c = quiet(), c.quiet_memory = 256; }), FTCS_ADDEND_BAD_MEMORY);
   EXPECT_EQ(error([](auto& c) { c.limit_ppm = 100; }, 0), FTCS_ADDEND_BAD_ADDEND);
   // A register that reaches only 1.2 times the nominal rate.
   EXPECT_EQ(ftcs_addend_default_config(3'579'139'413U).limit_ppm, 199'999U);
+}
+
+TEST(AddendServo, never_lets_a_clock_stand_still_however_small_its_nominal_addend) {
+  for (std::uint32_t nominal = 1; nominal <= 20'000; ++nominal) {
+    ftcs_addend_config config = ftcs_addend_default_config(nominal);
+    ftcs_addend_servo servo;
+    ASSERT_EQ(ftcs_addend_init(&servo, &config, nominal), FTCS_ADDEND_OK);
+    ASSERT_GE(servo.slowest, 1U) << nominal;
+    ASSERT_LE(servo.fastest, nominal + nominal / 2U) << nominal;
+  }
 }
 
 // Any bits in any field. Built with the undefined-behaviour sanitizer.

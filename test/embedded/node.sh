@@ -12,7 +12,7 @@ command -v ip > /dev/null || skip "no iproute2"
 
 target=(-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mthumb -Os -ffunction-sections -fdata-sections -ffp-contract=off)
 arm-none-eabi-g++ "${target[@]}" -std=c++20 -fno-exceptions -fno-rtti -fno-threadsafe-statics -Wall -Wextra -I. -Iembedded \
-  -Itest/embedded/board -Itest/embedded test/embedded/node.cpp "$out"/m4f/{ftcs_addend,startup,line}.o \
+  -Itest/embedded/board -Itest/embedded test/embedded/node.cpp "$out"/m4f/{ftcs_addend,ftcs_addend_actuator,ftcs_addend_arithmetic,ftcs_addend_quiet,startup,line}.o \
   "$out"/m4f/core/layer/{ptp/libftcs_ptp,clock/libftcs_clock}.a -nostartfiles --specs=nano.specs -Wl,--gc-sections \
   -T test/embedded/board/mps2.ld -o "$out/m4f/node.elf" || exit 1
 arm-none-eabi-size "$out/m4f/node.elf" | awk 'END {print "  " $1 " bytes of code, " $2 + $3 " of data"}'

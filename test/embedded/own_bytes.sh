@@ -1,8 +1,10 @@
 #!/bin/sh
-# own_bytes.sh IMAGE OBJECT: bytes in IMAGE of the functions and constants that OBJECT defines.
+# own_bytes.sh IMAGE OBJECT...: bytes in IMAGE of the functions and constants that the OBJECTs define.
 set -eu
-names=$(arm-none-eabi-nm --defined-only "$2" | awk '$2 ~ /[tTrR]/ && $3 !~ /^\$/ {sub(/\..*/, "", $3); print $3}' | sort -u)
-arm-none-eabi-nm -S -t d "$1" | awk -v names="$names" '
+image="$1"
+shift
+names=$(arm-none-eabi-nm --defined-only "$@" | awk '$2 ~ /[tTrR]/ && $3 !~ /^\$/ {sub(/\..*/, "", $3); print $3}' | sort -u)
+arm-none-eabi-nm -S -t d "$image" | awk -v names="$names" '
   BEGIN {split(names, list, "\n"); for (i in list) known[list[i]] = 1}
   {name = $4; sub(/\..*/, "", name)}
   $3 ~ /[tTrR]/ && known[name] {sum += $2}

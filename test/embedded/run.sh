@@ -17,12 +17,15 @@ done
 declare -A flags=([m4f]="-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard" [m7]="-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"
   [m0plus]="-mcpu=cortex-m0plus -mfloat-abi=soft")
 declare -A board=([m4f]=mps2-an386 [m7]=mps2-an500 [m0plus]=mps2-an385)
-# Limits: bytes of everything, of FTCS alone (init and update), mean instructions of an FTCS update.
-declare -A limit_all=([m4f]=5120 [m7]=5120 [m0plus]=5888) limit_ftcs=([m4f]=3456 [m7]=3456 [m0plus]=4032)
-declare -A limit_count=([m4f]=1300 [m7]=1300 [m0plus]=3350)
+# Limits: bytes of everything, of FTCS alone (ftcs_addend_start and ftcs_addend_take), mean instructions of an FTCS update.
+declare -A limit_all=([m4f]=4096 [m7]=4096 [m0plus]=4096) limit_ftcs=([m4f]=2048 [m7]=2048 [m0plus]=2400)
+declare -A limit_count=([m4f]=900 [m7]=900 [m0plus]=2500)
 common=(-mthumb -Os -ffunction-sections -fdata-sections -ffp-contract=off -I. -Iembedded -I"$here/board")
 link=(-nostartfiles --specs=nano.specs -Wl,--gc-sections -T "$here/board/mps2.ld")
 startup=("$here/board/startup.c" "$here/board/line.c")
+addend=(embedded/ftcs_addend*.c)
+strict=(-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wstrict-prototypes
+  -Wmissing-prototypes -Werror)
 
 emulate() {  # machine, image; -icount: an instruction takes 256 ns
   timeout 570 qemu-system-arm -M "$1" -nographic -monitor none -serial none -semihosting-config enable=on,target=native \
@@ -36,13 +39,19 @@ same() {  # what, ours, theirs
     cat "$out/diff"
   fi
 }
-bytes() { "$1-size" -t "$2" | awk 'END {print $1}'; }
+bytes() { "$1-size" -t "${@:2}" | awk 'END {print $1}'; }
 
 mkdir -p "$out/x86"
 echo "== x86"
 host=(-O2 -ffp-contract=off -I. -Iembedded -I"$here/board")
-gcc "${host[@]}" -std=c99 -DSAMPLES=1000000 "$here"/{addend_run,board/line,board/host}.c embedded/ftcs_addend.c -o "$out/x86/addend_long"
-gcc "${host[@]}" -std=c99 "$here"/{addend_run,board/line,board/host}.c embedded/ftcs_addend.c -o "$out/x86/addend"
+gcc "${host[@]}" -std=c99 -DSAMPLES=1000000 "$here"/{addend_run,board/line,board/host}.c "${addend[@]}" -o "$out/x86/addend_long"
+gcc "${host[@]}" -std=c99 "$here"/{addend_run,board/line,board/host}.c "${addend[@]}" -o "$out/x86/addend"
+for compiler in gcc clang; do  # without built-in functions and products of two words: for other compilers and processors
+  command -v "$compiler" > /dev/null || continue
+  "$compiler" "${host[@]}" -std=c99 -DFTCS_ADDEND_PORTABLE -DFTCS_ADDEND_NARROW "$here"/{addend_run,board/line,board/host}.c "${addend[@]}" \
+    -o "$out/x86/addend_$compiler"
+  for file in "${addend[@]}"; do "$compiler" "${strict[@]}" -O2 -c "$file" -o "$out/x86/strict.o"; done
+done
 cmake -S . -B "$out/x86/core" -G Ninja -DFTCS_CORE_ONLY=ON -DCMAKE_BUILD_TYPE=Release > "$out/x86/configure.log"
 cmake --build "$out/x86/core" > "$out/x86/build.log" || { tail -20 "$out/x86/build.log"; exit 1; }
 libraries=(layer/discipline/libftcs_cycle_servo.a layer/servo/libftcs_servo.a layer/measurement/libftcs_measurement.a
@@ -55,6 +64,11 @@ gcc "${host[@]}" -std=c99 -c "$here/board/host.c" -o "$out/x86/host.o"
 # shellcheck disable=SC2046
 g++ "${host[@]}" -std=c++20 "$here/core_run.cpp" "$out"/x86/{line,host}.o $(archives "$out/x86/core") -o "$out/x86/core_run"
 for program in addend_long addend core_run; do "$out/x86/$program" > "$out/x86/$program.txt"; done
+for compiler in gcc clang; do
+  [ -x "$out/x86/addend_$compiler" ] || continue
+  "$out/x86/addend_$compiler" > "$out/x86/addend_$compiler.txt"
+  same "portable ftcs_addend by $compiler" "$out/x86/addend_$compiler.txt" "$out/x86/addend.txt"
+done
 
 for cpu in m4f m7 m0plus; do
   echo "== Cortex-$cpu"
@@ -65,26 +79,29 @@ for cpu in m4f m7 m0plus; do
   cmake --build "$out/$cpu/core" > "$out/$cpu/build.log" || { fail "the core for $cpu"; grep -E 'error' "$out/$cpu/build.log"; continue; }
   echo "  the core compiles: $(find "$out/$cpu/core" -name '*.obj' | wc -l) objects, warnings as errors"
 
-  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror \
-    -c embedded/ftcs_addend.c -o "$out/$cpu/ftcs_addend.o"
-  if arm-none-eabi-nm -u "$out/$cpu/ftcs_addend.o" | grep -E '__aeabi_(d|f|i2|ui2|l2|ul2)|malloc|_sbrk'; then
+  objects=()
+  for file in "${addend[@]}"; do
+    objects+=("$out/$cpu/$(basename "$file" .c).o")
+    arm-none-eabi-gcc "${target[@]}" "${common[@]}" "${strict[@]}" -c "$file" -o "${objects[-1]}"
+  done
+  if arm-none-eabi-nm -u "${objects[@]}" | grep -E '__aeabi_(d|f|i2|ui2|l2|ul2)|malloc|_sbrk'; then
     fail "ftcs_addend for $cpu reaches for floating point or a heap"
   fi
-  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror \
-    -c examples/embedded/stm32_ptp_clock.c -o "$out/$cpu/stm32.o"
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" "${strict[@]}" -Wno-missing-prototypes -c examples/embedded/stm32_ptp_clock.c \
+    -o "$out/$cpu/stm32.o"
   arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Werror \
     -I"$here/zephyr_stub" -c examples/embedded/zephyr/src/ftcs_ptp_servo.c -o "$out/$cpu/zephyr.o"
-  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 "${startup[@]}" "$here/addend_run.c" embedded/ftcs_addend.c "${link[@]}" \
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 "${startup[@]}" "$here/addend_run.c" "${objects[@]}" "${link[@]}" \
     -o "$out/$cpu/addend.elf"
   emulate "${board[$cpu]}" "$out/$cpu/addend.elf" > "$out/$cpu/addend.txt"
   same "ftcs_addend" "$out/$cpu/addend.txt" "$out/x86/addend.txt"
 
-  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -DFTCS_ADDEND_WITHOUT_QUIET -DALONE "$here/footprint.c" \
-    embedded/ftcs_addend.c "${startup[@]}" "${link[@]}" -o "$out/$cpu/alone.elf"
-  all=$(bytes arm-none-eabi "$out/$cpu/ftcs_addend.o")
-  alone=$("$here/own_bytes.sh" "$out/$cpu/alone.elf" "$out/$cpu/ftcs_addend.o")
+  arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 "$here/footprint.c" "${objects[@]}" \
+    "${startup[@]}" "${link[@]}" -o "$out/$cpu/alone.elf"
+  all=$(bytes arm-none-eabi "${objects[@]}")
+  alone=$("$here/own_bytes.sh" "$out/$cpu/alone.elf" "${objects[@]}")
   count=$(sed -n 's/^# instructions of an update, ftcs: mean \([0-9]*\).*/\1/p' "$out/$cpu/addend.txt")
-  echo "  ftcs_addend: $all bytes with everything, $alone bytes for init and update without quiet mode; FTCS update $count instructions"
+  echo "  ftcs_addend: $all bytes with everything, $alone bytes for FTCS alone (start and take); FTCS update $count instructions"
   grep '^#' "$out/$cpu/addend.txt" | sed 's/^#/ /'
   [ "$all" -le "${limit_all[$cpu]}" ] || fail "$cpu: $all bytes, at most ${limit_all[$cpu]}"
   [ "$alone" -le "${limit_ftcs[$cpu]}" ] || fail "$cpu: FTCS alone $alone bytes, at most ${limit_ftcs[$cpu]}"
@@ -105,7 +122,7 @@ done
 echo "== ftcs_addend, 10^6 random samples, Cortex-M0+ against x86"
 read -ra target <<< "${flags[m0plus]}"
 arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 -DSAMPLES=1000000 "${startup[@]}" "$here/addend_run.c" \
-  embedded/ftcs_addend.c "${link[@]}" -o "$out/m0plus/addend_long.elf"
+  "${addend[@]}" "${link[@]}" -o "$out/m0plus/addend_long.elf"
 emulate mps2-an385 "$out/m0plus/addend_long.elf" > "$out/m0plus/addend_long.txt"
 same "10^6 samples" "$out/m0plus/addend_long.txt" "$out/x86/addend_long.txt"
 

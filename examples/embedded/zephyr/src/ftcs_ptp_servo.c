@@ -12,8 +12,18 @@
 #define NS_PER_SECOND 1000000000
 
 static const ftcs_addend_config config = {
-    NOMINAL, 50000, 100000, 4096, FTCS_ADDEND_UNBOUNDED, FTCS_ADDEND_UNBOUNDED, 1000, 5000, 0, 0,
-    0,       1,     64,     0};
+    .nominal_addend = NOMINAL,
+    .limit_ppm = 50000,
+    .plausible_ppm = 100000,
+    .gain_q16 = 65536,
+    .band_enter_ns = FTCS_ADDEND_UNBOUNDED,
+    .band_leave_ns = FTCS_ADDEND_UNBOUNDED,
+    .lock_enter_ns = 1000,
+    .lock_leave_ns = 5000,
+    .dwell = 1,
+    .filter = ftcs_addend_quiet,
+    .quiet_memory = 64,
+};
 static ftcs_addend_servo servo;
 static const struct device* device;
 static uint32_t next_addend;

@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT */
+#include "ftcs_addend_private.h"
+
+/* Leading zeros of a number that is not zero. */
+static uint32_t leading_zeros(uint32_t x) {
+#if defined(__GNUC__) && !defined(FTCS_ADDEND_PORTABLE)
+  return (uint32_t)__builtin_clz(x);
+#else
+  uint32_t zeros = 0;
+  while (x < 0x80000000U) {
+    x <<= 1;
+    ++zeros;
+  }
+  return zeros;
+#endif
+}
+
+/* The 32 highest bits of a number that is not zero in the upper half; in the lower, how
+ * far it was shifted to the left for that. */
+static uint64_t highest_bits(uint64_t x) {
+  uint32_t upper = (uint32_t)(x >> 32);
+  uint32_t lower = (uint32_t)x;
+  uint32_t shift = 0;
+  uint32_t zeros;
+  if (upper == 0U) {
+    upper = lower;
+    lower = 0;
+    shift = 32;
+  }
+  zeros = leading_zeros(upper);
+  upper = (upper << zeros) | ((lower >> 1) >> (31U - zeros));
+  return ((uint64_t)upper << 32) | (shift + zeros);
+}
+
+/* 2^63 / d for d >= 2^31, less than one too small: a quotient of 16 bits and the terms e and e^2 of
+ * 1 / (1 - e), e what it lacks. Every d: test/embedded/reciprocal.c. */
+static uint32_t reciprocal(uint32_t d) {
+  const uint32_t guess = UINT32_MAX / ((d >> 15) | 1U) * 2U + 1U; /* 2^48 / d */
+  const uint64_t lacks = (UINT64_C(1) << 48) - ftcs_addend_product(guess, d);
+  const int32_t error = (int32_t)(uint32_t)(lacks >> 2);
+  const int32_t rough = error >> 16;
+  const int64_t more = ftcs_addend_signed_product((int32_t)guess, error + (rough * rough >> 14));
+  return (guess << 15) + (uint32_t)((uint64_t)more >> 31);
+}
+
+ftcs_addend_ratio ftcs_addend_divide(int64_t n, int64_t d) {
+  int64_t ratio = 0;
+  if (n != 0) {
+    const uint64_t dividend = highest_bits(n < 0 ? 0U - (uint64_t)n : (uint64_t)n);
+    const uint64_t divisor = highest_bits((uint64_t)d);
+    const uint64_t product =
+        ftcs_addend_product((uint32_t)(dividend >> 32), reciprocal((uint32_t)(divisor >> 32))) +
+        (UINT64_C(3) << 30); /* half a unit, and half of what the reciprocal lacks at most */
+    const uint32_t above = (uint32_t)(product >> 63); /* 1: the mantissas' quotient is */
+    const uint32_t upper = (uint32_t)(product >> 32);
+    int32_t mantissa = (int32_t)((upper >> above) + (upper & above));
+    int32_t shift = (int32_t)((uint32_t)dividend - (uint32_t)divisor + 2U - above);
+    if (shift < 0) {
+      shift = 0;
+      mantissa = INT32_MAX;
+    }
+    if (shift > 31) {
+      mantissa >>= shift - 31;
+      shift = 31;
+    }
+    if (n < 0) mantissa = -mantissa;
+    ratio = (int64_t)((uint64_t)(uint32_t)mantissa << 32 | (uint32_t)shift);
+  }
+  return ratio;
+}
+
+ftcs_addend_ratio ftcs_addend_change(uint32_t to, uint32_t from) {
+  return ftcs_addend_divide((int64_t)to - (int64_t)from, from);
+}
+
+/* x = upper 2^28 + lower 2^-3, so that all products are of signed words. */
+int64_t ftcs_addend_times(int64_t x, ftcs_addend_ratio r) {
+  const int32_t mantissa = (int32_t)(uint32_t)((uint64_t)r >> 32);
+  const uint32_t shift = (uint32_t)r;
+  const int32_t upper = (int32_t)(uint32_t)((uint64_t)x >> 28);
+  const int32_t lower = (int32_t)(((uint32_t)x << 4) >> 1);
+  const int64_t product = (ftcs_addend_signed_product(upper, mantissa) >> 1) +
+                          (ftcs_addend_signed_product(lower, mantissa) >> 32);
+  const int32_t high = (int32_t)(uint32_t)((uint64_t)product >> 32);
+  const uint32_t low = (uint32_t)product >> shift | ((uint32_t)high << 1) << (31U - shift);
+  return (int64_t)((uint64_t)(uint32_t)(high >> shift) << 32 | low);
+}
+
+uint32_t ftcs_addend_size(int64_t x) {
+  const uint64_t size = (x < 0 ? 0U - (uint64_t)x : (uint64_t)x) >> 12;
+  return size > UINT32_MAX ? UINT32_MAX : (uint32_t)size;
+}
+
+int64_t ftcs_addend_difference(int64_t a_ns, int64_t b_ns) {
+  int64_t d = (int64_t)((uint64_t)a_ns - (uint64_t)b_ns);
+  if ((uint32_t)((uint64_t)d >> 32) + 0x200U >= 0x400U) {
+    d = d < 0 ? -FTCS_LONGEST_NS : FTCS_LONGEST_NS;
+  }
+  return d * 65536;
+}
+
+int64_t ftcs_addend_limited(int64_t addend_q16, uint32_t least, uint32_t most) {
+  return ftcs_addend_clamp(addend_q16, (int64_t)least << 16, (int64_t)most << 16);
+}

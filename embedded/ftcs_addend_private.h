@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FTCS_ADDEND_PRIVATE_H
+#define FTCS_ADDEND_PRIVATE_H
+
+/* What the sources of the servo share. Times are differences in 2^-16 ns below 2^60; what is longer
+ * than FTCS_LONGEST (37 minutes) is cut there and taken for a jump. A signed number is shifted to
+ * the right as every compiler for these processors does it: towards minus infinity. */
+
+#include <stddef.h>
+
+#include "ftcs_addend.h"
+
+#define FTCS_LONGEST_NS (INT64_C(1) << 41)
+#define FTCS_LONGEST (FTCS_LONGEST_NS << 16)
+#define FTCS_LONGEST_LATENCY (INT64_C(1) << 52) /* 69 s from the stamp to the command */
+
+typedef char ftcs_addend_shifts_signed[(-3 >> 1) == -2 ? 1 : -1];
+
+enum { FTCS_EMPTY = 0, FTCS_PRIMED = 1, FTCS_ACTING = 2 };
+
+/* a b. A processor that multiplies words to a word alone (Cortex-M0+) is served by four products of
+ * halves. */
+static inline uint64_t ftcs_addend_product(uint32_t a, uint32_t b) {
+#if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
+  const uint32_t low = (a & 0xFFFFU) * (b & 0xFFFFU);
+  const uint32_t cross = (a >> 16) * (b & 0xFFFFU) + (low >> 16);
+  const uint32_t other = (a & 0xFFFFU) * (b >> 16) + (cross & 0xFFFFU);
+  const uint32_t high = (a >> 16) * (b >> 16) + (cross >> 16) + (other >> 16);
+  return ((uint64_t)high << 32) | (other << 16) | (low & 0xFFFFU);
+#else
+  return (uint64_t)a * b;
+#endif
+}
+
+static inline int64_t ftcs_addend_signed_product(int32_t a, int32_t b) {
+#if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
+  const uint32_t below = ((uint32_t)a & (uint32_t)(b >> 31)) + ((uint32_t)b & (uint32_t)(a >> 31));
+  return (int64_t)(ftcs_addend_product((uint32_t)a, (uint32_t)b) - ((uint64_t)below << 32));
+#else
+  return (int64_t)a * b;
+#endif
+}
+
+/* n / d to 30 bits, d > 0, both below 2^62 in magnitude; at most 4. */
+ftcs_addend_ratio ftcs_addend_divide(int64_t n, int64_t d);
+
+/* to / from - 1, from > 0. */
+ftcs_addend_ratio ftcs_addend_change(uint32_t to, uint32_t from);
+
+/* x r towards minus infinity, |x| < 2^59 and |x r| < 2^61. */
+int64_t ftcs_addend_times(int64_t x, ftcs_addend_ratio r);
+
+/* |x| in 1/16 ns, at most UINT32_MAX (0.27 s). */
+uint32_t ftcs_addend_size(int64_t x);
+
+/* a - b in 2^-16 ns, modulo 2^64 ns (a counter that wraps is no event), cut at +- FTCS_LONGEST. */
+int64_t ftcs_addend_difference(int64_t a_ns, int64_t b_ns);
+
+/* Modulo 2^64. */
+static inline int64_t ftcs_addend_sum(int64_t a, int64_t b) {
+  return (int64_t)((uint64_t)a + (uint64_t)b);
+}
+
+static inline int64_t ftcs_addend_clamp(int64_t x, int64_t low, int64_t high) {
+  return x < low ? low : (x > high ? high : x);
+}
+
+/* An addend in 2^-16, cut at two whole ones. */
+int64_t ftcs_addend_limited(int64_t addend_q16, uint32_t least, uint32_t most);
+
+/* The mean of the sizes, one more. */
+static inline uint32_t ftcs_addend_average(uint32_t mean, uint32_t size) {
+  return mean == 0U ? size : mean - mean / 8U + size / 8U;
+}
+
+/* What the clock would have shown at W while it showed `local` since start_ns. */
+int64_t ftcs_addend_tracking_time(const ftcs_addend_servo* servo, int64_t local);
+
+/* nominal (1 + ppm / 10^6) */
+int64_t ftcs_addend_beyond(uint32_t nominal, uint32_t ppm);
+
+/* The correction that begins at start_ns. */
+static inline void ftcs_addend_plan(ftcs_addend_servo* s, int64_t start_ns, int64_t length,
+                                    uint32_t correction) {
+  s->start_ns = start_ns;
+  s->length = s->config->no_timer != 0U ? FTCS_LONGEST : length;
+  s->shortening = ftcs_addend_change(s->addend, correction);
+}
+
+/* [T_sync] Of the last two gaps the shorter: a missing message does not make the interval longer.
+ */
+static inline int64_t ftcs_addend_interval(const ftcs_addend_servo* s, int64_t gap) {
+  if (s->config->interval_ns != 0) return s->config->interval_ns * 65536;
+  return s->interval != 0 && s->interval < gap ? s->interval : gap;
+}
+
+static inline int32_t ftcs_addend_state_of(const ftcs_addend_servo* s) {
+  return s->interval != 0 ? (int32_t)FTCS_ADDEND_ACQUIRING + s->locked
+                          : (int32_t)FTCS_ADDEND_WAITING;
+}
+
+#endif
