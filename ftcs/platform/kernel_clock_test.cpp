@@ -253,6 +253,18 @@ TEST_P(KernelClockTest, reports_a_frequency_that_somebody_else_set) {
   EXPECT_FALSE(clock.take_foreign_steering().found_rate.has_value()) << "once";
 }
 
+TEST_P(KernelClockTest, the_end_of_a_correction_does_not_hide_that_somebody_changed_the_frequency) {
+  KernelClock clock = make();
+  ASSERT_TRUE(clock.apply(correct(100.0, 20 * kMillisecond, 10.0)).ok());
+  truth().freq = static_cast<long>(25.0 * 65536.0);
+  sleep(clock, 30 * kMillisecond);
+  EXPECT_NEAR(truth().steering(), 1.0 + 10e-6, 2e-11) << "the correction has ended";
+  const ForeignSteering foreign = clock.take_foreign_steering();
+  ASSERT_TRUE(foreign.found_rate.has_value());
+  EXPECT_NEAR(foreign.found_rate->ppm(), 25.0, 1e-4);
+  EXPECT_NEAR(foreign.expected_rate->ppm(), 100.0, 1e-4);
+}
+
 TEST_P(KernelClockTest, survives_a_step_by_somebody_else) {
   for (const double leap_ns : {0.5 * kSecond, -0.5 * kSecond}) {
     KernelClock clock = make();

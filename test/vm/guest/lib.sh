@@ -78,7 +78,8 @@ until_says() {  # FILE PATTERN [SECONDS]
   return 1
 }
 
-# Runs a command for some seconds, then ends it by SIGINT; NAME.truth has the truth, NAME.log what it said, $code its exit code.
+# Runs a command for some seconds, then ends it by SIGINT; NAME.truth has the truth, NAME.log what it said, $code its exit code. Of ftcs ptp,
+# NAME.stated has each line of its --csv beside the truth.
 follow() {  # NAME SECONDS COMMAND...
   local name=$1 length=$2
   shift 2
@@ -88,10 +89,18 @@ follow() {  # NAME SECONDS COMMAND...
 }
 
 start_follow() {  # NAME SECONDS COMMAND...
-  following=$1
+  following=$1 annotator=
   chrt -f 30 witness truth "$2" "${INTERVAL:-0.05}" > "$1.truth" &
   truth_log=$!
-  "${@:3}" > "$1.log" 2>&1 &
+  if [[ " ${*:3} " == *" ftcs ptp "* ]]; then
+    rm -f stated.pipe
+    mkfifo stated.pipe
+    chrt -f 30 witness annotate < stated.pipe > "$1.stated" &
+    annotator=$!
+    "${@:3}" --csv > stated.pipe 2> "$1.log" &
+  else
+    "${@:3}" > "$1.log" 2>&1 &
+  fi
   follower=$!
 }
 
@@ -100,26 +109,11 @@ end_follow() {
   wait "$follower"
   code=$?
   wait "$truth_log"
+  [ -z "$annotator" ] || wait "$annotator"
 }
 
-# As follow, with ftcs's --csv, each line of which is written down beside the truth in NAME.stated.
-follow_stated() {  # NAME SECONDS COMMAND...
-  local name=$1 length=$2
-  shift 2
-  rm -f stated.pipe
-  mkfifo stated.pipe
-  chrt -f 30 witness annotate < stated.pipe > "$name.stated" &
-  local annotator=$!
-  chrt -f 30 witness truth "$length" "${INTERVAL:-0.05}" > "$name.truth" &
-  truth_log=$!
-  "$@" --csv > stated.pipe 2> "$name.log" &
-  follower=$!
-  sleep "$length"
-  end_follow
-  wait "$annotator"
-}
-
-# What happened, as one line of the report; the table is made of these. A limit that does not hold is a failure.
+# What happened, as one line of the report; the table is made of these. A limit that does not hold is a failure. What ours stated of its own error
+# is judged with it: 99 of 100 within three times the deviation, from 5 s on.
 judge() {  # NAME A-B [limit=V ...]
   local answer
   if answer=$(witness judge "$1.truth" "${@:2}" 2>&1); then
@@ -128,7 +122,15 @@ judge() {  # NAME A-B [limit=V ...]
     echo "FAILED  $1:$answer" | tee "$1.judged"
     failures=$((failures + 1))
   fi
+  if [ -s "$1.stated" ] && [ -z "$UNSEEN" ] && [ ! -e "$1.stated.judged" ]; then
+    touch "$1.stated.judged"
+    # shellcheck disable=SC2046
+    judge_stated "$1" "$2" from=5 $(printf '%s\n' "${@:3}" | grep "^target=")
+  fi
 }
+
+# Set by a job in which the error of the path that no message shows, an asymmetry, is greater than what is stated.
+UNSEEN=
 
 # A limit that the issue wants and the program does not keep yet: said, counted apart, no failure.
 goal() {  # as judge
@@ -146,15 +148,6 @@ judge_stated() {  # NAME A-B [share=PERCENT] [from=S]
     echo "ok      $1:$answer"
   else
     fail "$1:$answer"
-  fi
-}
-
-goal_stated() {
-  local answer
-  if answer=$(witness sigma "$1.stated" "${@:2}" 2>&1); then
-    echo "ok      $1:$answer"
-  else
-    echo "MISSED  $1:$answer"
   fi
 }
 

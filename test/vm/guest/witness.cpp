@@ -50,11 +50,16 @@ double seconds(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-std::string read_truth() {
+std::optional<std::string> find_truth() {
   std::ifstream file(kTruth);
   std::string line;
-  if (!std::getline(file, line)) throw std::runtime_error(std::string("cannot read ") + kTruth);
-  return line;
+  return std::getline(file, line) ? std::optional(line) : std::nullopt;
+}
+
+std::string read_truth() {
+  const auto line = find_truth();
+  if (!line) throw std::runtime_error(std::string("cannot read ") + kTruth);
+  return *line;
 }
 
 int truth(const Arguments& arguments) {
@@ -71,8 +76,10 @@ int truth(const Arguments& arguments) {
 }
 
 int annotate() {
-  for (std::string line; std::getline(std::cin, line);)
-    std::cout << read_truth() << " | " << line << std::endl;
+  for (std::string line; std::getline(std::cin, line);) {
+    const auto truth = find_truth();
+    if (truth) std::cout << *truth << " | " << line << std::endl;  // else the device is gone
+  }
   return 0;
 }
 
