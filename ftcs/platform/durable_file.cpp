@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 
 namespace ftcs::platform {
 namespace {
@@ -37,22 +38,39 @@ std::string folder_of(const std::string& path) {
   return slash == std::string::npos ? "." : path.substr(0, slash + 1);
 }
 
-/// A file without a name where the file system has that: a process that is killed while it writes
-/// leaves nothing behind. Else one of the name that `part` becomes.
-int open_part(const std::string& path, std::string& part) {
-  const int file = ::open(folder_of(path).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
-  if (file >= 0) return file;
-  part = path + ".XXXXXX";
-  return ::mkostemp(part.data(), O_CLOEXEC);
-}
+/// Closes it. `code`, or errno.
+int close_after(int file, int code) { return ::close(file) != 0 && code == 0 ? errno : code; }
 
-/// Gives a file without a name one, `part`, for the moment until it is renamed. errno, or 0.
+/// Gives a file without a name one, for the moment until it is renamed. errno, or 0.
 int name_part(int file, const std::string& path, std::string& part) {
   const std::string self = "/proc/self/fd/" + std::to_string(file);
-  part = path + "." + std::to_string(::getpid());
-  (void)::unlink(part.c_str());  // of a process with this number that was killed right here
-  return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, part.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0
-                                                                                          : errno;
+  std::string name = path + "." + std::to_string(::getpid());
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) != 0) {
+    return errno;
+  }
+  part = std::move(name);
+  return 0;
+}
+
+/// Into a file without a name: a process that is killed while it writes leaves nothing behind.
+/// errno, or 0; `part` is the name that it has at the end. Not every file system has such files,
+/// and naming one needs /proc.
+int write_unnamed(const std::string& path, std::string_view content, std::string& part) {
+  const int file = ::open(folder_of(path).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+  if (file < 0) return errno;
+  int code = write_and_sync(file, content);
+  if (code == 0) code = name_part(file, path, part);
+  // Once more: btrfs synchronises nothing of a file that has no name.
+  if (code == 0 && ::fsync(file) != 0) code = errno;
+  return close_after(file, code);
+}
+
+int write_named(const std::string& path, std::string_view content, std::string& part) {
+  std::string name = path + ".XXXXXX";
+  const int file = ::mkostemp(name.data(), O_CLOEXEC);
+  if (file < 0) return errno;
+  part = std::move(name);
+  return close_after(file, write_and_sync(file, content));
 }
 
 void sync_folder_of(const std::string& path) {
@@ -71,11 +89,8 @@ std::optional<std::string> write_durably(const std::string& path, std::string_vi
   };
   if (!may_be_replaced(path)) return "cannot write " + path + ": it is no regular file";
   std::string part;
-  const int file = open_part(path, part);
-  if (file < 0) return failure(errno);
-  int code = write_and_sync(file, content);
-  if (code == 0 && part.empty()) code = name_part(file, path, part);
-  if (::close(file) != 0 && code == 0) code = errno;
+  int code = write_unnamed(path, content, part);
+  if (code != 0 && part.empty()) code = write_named(path, content, part);
   if (code == 0 && ::rename(part.c_str(), path.c_str()) != 0) code = errno;
   if (code != 0) {
     if (!part.empty()) (void)::unlink(part.c_str());

@@ -9,10 +9,10 @@
 namespace ftcs::platform {
 
 /// Replaces the file `path` by `content` so that at any moment, a crash or loss of power included,
-/// either the old or the new content is there: written to a file without a name (or, where the file
-/// system has none, of a temporary name beside it), synchronised, named, renamed, the folder
-/// synchronised. What exists at `path` must be a regular file: a device, a pipe
-/// or a link is not replaced. Returns what failed, with the system's reason.
+/// either the old or the new content is there: written to a file without a name (or, where that
+/// cannot be had or named, of a temporary name beside it), synchronised, named, renamed, the folder
+/// synchronised. What exists at `path` must be a regular file: a device, a pipe or a link is not
+/// replaced. Returns what failed, with the system's reason.
 [[nodiscard]] std::optional<std::string> write_durably(const std::string& path,
                                                        std::string_view content);
 

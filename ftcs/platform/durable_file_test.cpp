@@ -45,6 +45,17 @@ TEST_F(DurableFile, a_failure_names_the_file_and_costs_nothing) {
   EXPECT_EQ(files(), 1);
 }
 
+// Whoever may write into the folder can guess the name that a file without one is given.
+TEST_F(DurableFile,
+       what_has_the_name_that_it_wanted_for_a_moment_is_neither_touched_nor_in_the_way) {
+  const std::string wanted = "a." + std::to_string(getpid());
+  std::ofstream(folder_ / wanted) << "of somebody else";
+  EXPECT_EQ(write_durably(folder_ / "a", "one"), std::nullopt);
+  EXPECT_EQ(content("a"), "one");
+  EXPECT_EQ(content(wanted), "of somebody else");
+  EXPECT_EQ(files(), 2);
+}
+
 // --driftfile /dev/null: the device node became a file, for the whole machine.
 TEST_F(DurableFile, what_is_no_regular_file_is_not_replaced) {
   const auto pipe = folder_ / "pipe";
