@@ -227,7 +227,7 @@ TEST_F(Node, what_the_gate_does_not_admit_steers_nothing) {
 TEST_F(Node, a_jump_of_the_reference_is_told_and_begins_anew) {
   lock();
   events.clear();
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 9; ++i) {  // a second
     EXPECT_TRUE(places<ptp::ReferenceJumped>().empty());
     start += kInterval;
     at(start + kDelay);

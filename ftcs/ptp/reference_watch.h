@@ -21,12 +21,14 @@ inline constexpr Nanoseconds kJumpTolerance{500'000'000};
 ///
 /// A Sync agrees with another if |jump| <= kJumpTolerance + (time between them) / 8; with the last
 /// one that was believed, the time does not count for which it has been contradicted. A new time is
-/// believed with its kAgreeing-th Sync in a row, over at least the usual gap between two Syncs, so
-/// that a burst between two true ones is none. A true transmitter that was set is followed two
-/// Syncs later; who can only add messages to its own never is.
+/// believed with its kAgreeing-th Sync in a row or a later one, over at least kLeastSpan and the
+/// usual gap between two Syncs: that gap alone is what anybody can make short by adding Syncs that
+/// agree. A true transmitter that was set is followed a second later; who can only add messages to
+/// those of one that sends a Sync a second or more never is.
 class ReferenceWatch {
  public:
   static constexpr int kAgreeing = 3;
+  static constexpr Nanoseconds kLeastSpan{1'000'000'000};
 
   enum class Verdict : std::uint8_t { kGoesOn, kDoubted, kJumped };
   struct Finding {
@@ -43,8 +45,10 @@ class ReferenceWatch {
     candidate_ = pair;
     ++agreeing_;
     const Duration span = pair.free_running - first_.free_running;
-    const Duration least = usual_gap_ > Duration{} ? usual_gap_ : between(*last_, first_);
-    if (agreeing_ < kAgreeing || span < least) return {Verdict::kDoubted, {}};
+    const Duration gap = usual_gap_ > Duration{} ? usual_gap_ : between(*last_, first_);
+    if (agreeing_ < kAgreeing || span < std::max(gap, Duration{kLeastSpan})) {
+      return {Verdict::kDoubted, {}};
+    }
     const Duration jump = jump_between(*last_, pair);
     reset();
     last_ = pair;

@@ -130,7 +130,8 @@ class TimeReceiver {
                     ActionList& actions) noexcept;
   void on_delay_resp(const Header& header, const DelayResp& response, FreeRunningTime now,
                      ActionList& actions) noexcept;
-  [[nodiscard]] bool believes_information(const FollowUp& follow_up, ActionList& actions) noexcept;
+  [[nodiscard]] bool believes_information(const FollowUp& follow_up, FreeRunningTime now,
+                                          ActionList& actions) noexcept;
   bool decide(FreeRunningTime now, ActionList& actions) noexcept;
   void select(const TransmitterData& data, FreeRunningTime now, ActionList& actions) noexcept;
   void deliver(const EventPair& pair, ActionList& actions) noexcept;
@@ -163,6 +164,7 @@ class TimeReceiver {
   FollowUpInformation information_{};
   std::uint16_t new_time_base_ = 0;  ///< another indicator than the believed one, told so often
   int new_time_base_told_ = 0;
+  FreeRunningTime new_time_base_since_{};
   bool servo_locked_ = false;
 };
 

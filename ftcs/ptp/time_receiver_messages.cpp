@@ -170,21 +170,25 @@ void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
   port_.count(Counter::kFollowUpReceived);
   const auto pair = matcher_.on_follow_up(header, follow_up, now, port_.counters());
   const bool informed = pair && config_.major_sdo_id == kGptpSdoId;
-  if (informed && !believes_information(follow_up, actions)) return;
+  if (informed && !believes_information(follow_up, now, actions)) return;
   emit(pair, now, actions);
 }
 
 /// 802.1AS-2020, 11.4.4.3: how fast the grandmaster is, by the sender's clock, by which the peer
 /// delay was measured; and that its time base changed, however small the jump. That is believed
-/// once ReferenceWatch::kAgreeing Follow_Ups in a row have said it; until then they tell no time.
-bool TimeReceiver::believes_information(const FollowUp& follow_up, ActionList& actions) noexcept {
+/// once ReferenceWatch::kAgreeing Follow_Ups in a row have said it, over kLeastSpan; until then
+/// they tell no time.
+bool TimeReceiver::believes_information(const FollowUp& follow_up, FreeRunningTime now,
+                                        ActionList& actions) noexcept {
   if (!follow_up.has_information) return true;
   const std::uint16_t indicator = follow_up.information.gm_time_base_indicator;
   const bool changed = has_information_ && information_.gm_time_base_indicator != indicator;
   const bool again = changed && new_time_base_told_ > 0 && new_time_base_ == indicator;
   new_time_base_ = indicator;
   new_time_base_told_ = changed ? (again ? new_time_base_told_ + 1 : 1) : 0;
-  if (changed && new_time_base_told_ < ReferenceWatch::kAgreeing) {
+  if (new_time_base_told_ == 1) new_time_base_since_ = now;
+  if (changed && (new_time_base_told_ < ReferenceWatch::kAgreeing ||
+                  now - new_time_base_since_ < Duration{ReferenceWatch::kLeastSpan})) {
     port_.count(Counter::kDoubtedTime);
     return false;
   }
