@@ -43,6 +43,12 @@ def spikes(part):
     return f"{gaussian(100e-9)} (* 100e-6 (equal {part} (uniform) 0.0))"
 
 
+def queue(load):
+    """20 ns of jitter, and with probability `load` the wait in a queue of 120 us frames (M/M/1): Syncs come so seldom that
+    one wait tells nothing of the next."""
+    return f"{gaussian(20e-9)} (* {120e-6 / (1 - load)} (exponential) (equal {load} (uniform) 0.0))"
+
+
 class Scenario:
     def __init__(self, name, interval=1.0, noise=100e-9, forward=None, backward=None, frequency=None, step=False,
                  goal=None, event=None, c5_band=None, wander=None):
@@ -112,6 +118,11 @@ SCENARIOS = [
     Scenario("sine 1 s", frequency=sine(75), goal={"rms": (95, 105)}),
     Scenario("sine 125 ms", FAST, frequency=sine(75), goal={"rms": (58, 65)}),
     Scenario("one-way load 1 s", forward=exponential(1e-6), backward=gaussian(100e-9), goal={"rms": (40, 60)}),
+    Scenario("20 % load 125 ms", FAST, noise=20e-9, forward=queue(0.2), goal={"rms": (6, 10)}),
+    Scenario("40 % load 125 ms", FAST, noise=20e-9, forward=queue(0.4), goal={"rms": (6, 10)}),
+    Scenario("60 % load forward 125 ms", FAST, noise=20e-9, forward=queue(0.6), backward=gaussian(20e-9),
+             goal={"rms": (6, 10)}),
+    Scenario("40 % load 1 s", noise=20e-9, forward=queue(0.4), goal={"rms": (15, 25)}),
     Scenario("60 s outage", event="outage", goal={"rms": (10, 30)}),
     Scenario("20 us reference step", event="reference", goal={"after 3": (500, 1000), "overshoot": (1000, 1000)}),
     Scenario("15 us path change", event="path", goal={"max": (1000, 1000)}),
@@ -148,10 +159,15 @@ def mechanism(scenario, p2p):
     return {"delay_mechanism": "P2P", "logMinPdelayReqInterval": round(math.log2(scenario.interval))} if p2p else {}
 
 
+# clknetsim's clocks begin in 1970, it says of every message that it was sent to one host, and it does not simulate
+# CLOCK_BOOTTIME, by which ftcs watches whether a reference jumps.
+IN_CLKNETSIM = ["--allow-epoch", "--max-change", "0", "--max-total-change", "0"]
+
+
 def ftcs(servo, *more, p2p=False):
     def commands(scenario, folder, tools):
         node = [tools["ftcs"], "ptp", "-i", "eth0", "-P" if p2p else "-E", "--servo", servo,
-                "--allow-epoch", *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else []),
+                "--unicast", "192.168.123.1", *IN_CLKNETSIM, *(more or ("-H", "--clock", "phc")), *(["--first-step"] if scenario.step else []),
                 *(f"--{key}={value}" for key, value in mechanism(scenario, p2p).items())]
         return [ptp_transmitter(scenario, folder, tools, mechanism(scenario, p2p)), node]
     return commands
@@ -180,7 +196,7 @@ def chronyd(scenario, folder, tools):
 
 def ftcs_phc(*more):
     def commands(scenario, _folder, tools):
-        return [[tools["ftcs"], "phc", "--allow-epoch", "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
+        return [[tools["ftcs"], "phc", *IN_CLKNETSIM, "-s", "/dev/ptp0", "-O", "0", "-R", str(1 / scenario.interval),
                  "-F", "0.00002" if scenario.step else "0", *more]]
     return commands
 
