@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
@@ -13,20 +14,15 @@ namespace {
 constexpr double kLn2Pi = 1.8378770664093453;
 /// Beyond this many sigma on the late side the normal part no longer matters.
 constexpr double kFarLate = 8.0;
-/// Below this the quotient of density and distribution needs its asymptotic
-/// series.
-constexpr double kFarEarly = -6.0;
 constexpr double kSmallestCurvature = 1e-12;
 
 /// phi(u) / Phi(u), the inverse Mills ratio at -u.
 double hazard(double u) noexcept {
-  if (u < kFarEarly) {
-    // Phi(u) = phi(u)/(-u) (1 - 1/u^2 + 3/u^4 - 15/u^6 + 105/u^8 - ...)
-    const double v = 1.0 / (u * u);
-    return -u / (1.0 - v * (1.0 - v * (3.0 - v * (15.0 - v * 105.0))));
-  }
+  constexpr double kRootTwo = std::numbers::sqrt2;
+  constexpr double kRootHalfPi = 1.2533141373155003;
+  if (u <= 0.0) return 1.0 / (kRootHalfPi * scaled_erfc(-u / kRootTwo));
   const double phi = quick_exp(-0.5 * u * u - 0.5 * kLn2Pi);
-  return phi / (0.5 * std::erfc(-u * std::numbers::sqrt2 / 2.0));
+  return phi / (1.0 - phi * kRootHalfPi * scaled_erfc(u / kRootTwo));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ftcs/estimation/delay_shape.h"
+#include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/lanes.h"
 #include "ftcs/estimation/quick_math.h"
 
@@ -260,7 +261,8 @@ void FloorEstimator::adopt(const FloorFit& fit) noexcept {
     // The earliest of b messages is at the floor with probability 1 - (1 -
     // w)^b.
     const double entries = 1.0 / static_cast<double>(search_.stride());
-    const double share = 1.0 - std::pow(1.0 - fit.noise[direction].share, entries);
+    const double share =
+        1.0 - portable_exp(entries * portable_log(1.0 - fit.noise[direction].share));
     begin_path(paths_[direction], share, std::min(fit.members[direction], 10.0));
   }
   mixed_ = bank_.mixture(weight_, scale_);

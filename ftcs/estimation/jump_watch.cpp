@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/estimation/elementary.h"
+
 namespace ftcs::estimation {
 namespace {
 
@@ -48,7 +50,7 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
   filter_.start(jumped);
   const double rate = size / (std::abs(message.seen.elapsed) + kUnnoticed);
   preference_ =
-      std::clamp(kSteepness * std::log(rate / kUsualRate), -kMostPreference, kMostPreference);
+      std::clamp(kSteepness * portable_log(rate / kUsualRate), -kMostPreference, kMostPreference);
   lead_ = kPrior;
   two_way_ = message.two_way;
   alive_ = size * size < ModelBank<OneModel>::kLargestVariance;

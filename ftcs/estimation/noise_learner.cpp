@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/quick_math.h"
 #include "ftcs/measurement/order_statistic.h"
 
@@ -127,7 +128,7 @@ DelayShape NoiseLearner<Window>::decide(const Case& said) noexcept {
 template <std::size_t Window>
 double NoiseLearner<Window>::tail_doubt() const noexcept {
   const double sure = static_cast<double>(lead_) - kTailOn;
-  return has_tail_ ? std::min(1.0, std::exp(-sure / kSureness)) : 0.0;
+  return has_tail_ ? std::min(1.0, portable_exp(-sure / kSureness)) : 0.0;
 }
 
 template class NoiseLearner<32>;
