@@ -8,14 +8,18 @@ namespace ftcs::daemon {
 namespace {
 constexpr Duration kLargestGap{Nanoseconds{1'000'000'000}};
 constexpr Duration kJump{Nanoseconds{10'000}};
+/// Readings that are nearer to each other say nothing of a slope.
+constexpr Duration kSmallestGap{Nanoseconds{100'000'000}};
 }  // namespace
 
 void PlantLine::add(const PlantReading& reading) noexcept {
   if (count_ > 0) {
-    const bool late = reading.instant - newest().instant > kLargestGap;
+    const Duration gap = reading.instant - newest().instant;
+    if (gap > Duration{} && gap < kSmallestGap) return;
+    const bool late = gap > kLargestGap;
     // The first line has no slope of its own yet: an oscillator 100 ppm off is 12 us further on.
     const bool jumped = count_ > 1 && abs(reading.plant - extended_to(reading.instant)) > kJump;
-    if (late || jumped || reading.instant <= newest().instant) count_ = 0;
+    if (late || jumped || gap <= Duration{}) count_ = 0;
   }
   kept_[count_ % kKept] = reading;
   ++count_;

@@ -21,7 +21,8 @@ struct PlantReading {
 ///   plant(t) = p_n + (t - t_n) (p_n - p_1) / (t_n - t_1)
 ///
 /// A second after the last reading nothing is known any more. A reading further than 10 us from the
-/// line is a jump, and the line begins anew: between two readings no crystal wanders as far.
+/// line is a jump, and the line begins anew: between two readings no crystal wanders as far. Who is
+/// asked more often, as a PTP receiver with each message that comes, is heard ten times a second.
 class PlantLine {
  public:
   void add(const PlantReading& reading) noexcept;
