@@ -14,18 +14,19 @@ ftcs_addend_config ftcs_addend_quiet_config(uint32_t nominal_addend) {
 }
 
 /* Too long a memory follows the oscillator late, and its innovations are correlated: their signs
- * tell it whatever the noise. A quarter less then, one sample more while they are white. */
+ * tell it whatever the noise. Half of it is dropped then, and one sample added while they are
+ * white. (Measured: docs/embedded.md, quiet mode.) */
 static void adapt_memory(ftcs_addend_servo* s, int64_t innovation) {
   const uint8_t sign = innovation < 0 ? FTCS_NEGATIVE : FTCS_POSITIVE;
   const int32_t same = (s->last & FTCS_SIGN) == sign ? 256 : -256;
   if ((s->last & FTCS_SIGN) != 0U) {
-    s->whiteness = (int16_t)(s->whiteness + (same - s->whiteness) / 16);
+    s->whiteness = (int16_t)(s->whiteness + (same - s->whiteness) / 24);
   }
   s->last = sign;
-  if (s->whiteness > 96) {
-    s->memory = (uint16_t)(s->memory - s->memory / 4U);
-    s->whiteness = 48;
-  } else if (s->whiteness < 32 && s->memory < s->config->quiet_memory) {
+  if (s->whiteness > 72) {
+    s->memory = (uint16_t)(s->memory - s->memory / 2U);
+    s->whiteness = 16;
+  } else if (s->whiteness < 0 && s->memory < s->config->quiet_memory) {
     ++s->memory;
   } else {
     /* as it is */

@@ -19,18 +19,26 @@ class Plant {
   static constexpr std::int64_t kTick = 20;
   static constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
 
-  Plant(std::int64_t interval_ns, double rate_ppb, std::int64_t offset_ns, double noise_ns)
+  Plant(std::int64_t interval_ns, double rate_ppb, std::int64_t offset_ns, double noise_ns,
+        std::uint64_t seed = 0)
       : interval_(Fine{interval_ns} * kFineNs),
         rate_ppb_(rate_ppb),
         noise_(noise_ns),
-        clock_(kNominal, 0, Fine{kEpoch + offset_ns} * kFineNs) {}
+        clock_(kNominal, 0, Fine{kEpoch + offset_ns} * kFineNs),
+        unaligned_(seed != 0),
+        random_(seed + 1),
+        moments_(seed) {}
 
   /// True offset at the present event of what the clock shows, local minus reference.
   [[nodiscard]] double true_offset_ns() const {
     return duration_of(Fine{shown(event_)} * kFineNs - reference()).ns();
   }
+  /// An interval on; with a seed, up to a microsecond more: an interval that is a multiple of the
+  /// tick shows every event at the same place within a tick, and hides what a tick does.
   void next(int intervals = 1) {
-    const Fine gap = interval_ * intervals;
+    Fine gap = interval_ * intervals;
+    if (unaligned_)
+      gap = gap + Fine{static_cast<std::int64_t>(moments_() % 1'000'000)} * (kFineNs / 1000);
     elapsed_ = elapsed_ + gap;
     const auto bent = static_cast<Fine>(duration_of(gap).ns() * rate_ppb_ * 1e-9 * 4294967296.0);
     event_ = event_ + gap + bent;  // the oscillator is fast by rate_ppb
@@ -70,7 +78,9 @@ class Plant {
   AddendLine clock_;
   Fine event_ = 0;
   Fine elapsed_ = 0;
-  std::mt19937_64 random_{1};
+  bool unaligned_;
+  std::mt19937_64 random_;
+  std::mt19937_64 moments_;
   std::normal_distribution<double> gauss_{0.0, 1.0};
 };
 
