@@ -28,6 +28,10 @@ grep -q "delay 24[0-9][0-9] ns" "$folder/scan" || fail "scan: the last of eight 
 "$ftcs" ethercat run "${to[@]}" --drives 9 > "$folder/fewer" 2>&1
 [ $? -eq 1 ] || fail "fewer drives than expected: exit code 1"
 grep -q "expected 9, found 8" "$folder/fewer" || fail "fewer drives: no clear error"
+"$ftcs" ethercat run "${to[@]}" --cycle 100ms --sync1 2=100:0us > "$folder/sync1" 2>&1
+[ $? -eq 2 ] && grep -q "drive 2: 100 cycles are longer than the 4.29 s" "$folder/sync1" || fail "SYNC1 beyond its register"
+"$ftcs" ethercat run "${to[@]}" --drift-pulses 200 --sync0-shift 8=100us > "$folder/absent" 2>&1
+[ $? -eq 1 ] && grep -q "of drive 8: there are drives 0 to 7" "$folder/absent" || fail "SYNC0 of a drive that is not there"
 
 # 4 ms leave a busy machine time to answer.
 "$ftcs" ethercat run "${to[@]}" --drives 8 --cycle 4ms --sync-interval 200ms --gate 1ms --duration 6 \

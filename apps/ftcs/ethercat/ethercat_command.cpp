@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -96,6 +97,10 @@ std::optional<std::string> check_drive_sync(const daemon::RunOptions& options) {
     if (sync.sync1_shift < Nanoseconds{0} || sync.sync1_shift >= cycle) {
       return fmt::format("--sync1: drive {}: {} ns is not from zero to below a cycle", n,
                          sync.sync1_shift.count());
+    }
+    if (sync.sync1_register(cycle) > std::numeric_limits<std::uint32_t>::max()) {
+      return fmt::format("--sync1: drive {}: {} cycles are longer than the 4.29 s of a register", n,
+                         sync.sync1_cycles);
     }
   }
   return std::nullopt;

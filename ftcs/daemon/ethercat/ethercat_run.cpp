@@ -106,6 +106,16 @@ std::optional<WriteError> write_reports(const MainRunner& runner) {
   return write_file(options.html, report.render());
 }
 
+/// What is asked of a drive that is not there would be done to none.
+std::optional<std::string> drive_that_is_not_there(const RunOptions& options, std::size_t count) {
+  for (std::size_t n = count; n < options.drive_sync.size(); ++n) {
+    if (options.drive_sync[n] == ethercat::DriveSync{}) continue;
+    return fmt::format("--sync0-shift or --sync1 of drive {}: there are drives 0 to {} only", n,
+                       count - 1);
+  }
+  return std::nullopt;
+}
+
 int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const RunOptions& options = runner.options();
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
@@ -113,6 +123,9 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
+  if (const auto wrong = drive_that_is_not_there(options, runner.main().network().count)) {
+    return end_with(*wrong, kRuntimeError);
+  }
   if (options.bus_mode != node::BusMode::kFollow && !runner.main().network().has_reference()) {
     return end_with("no drive with a distributed clock: there is nothing to put on plant time",
                     kRuntimeError);

@@ -20,7 +20,12 @@ PtpOptions plant_options(PtpOptions options) {
   options.source = Source::kNetwork;
   options.clock = ClockKind::kVirtual;
   options.first_step = true;  // before the first cycle; nobody acts on that clock yet
+  // A configuration file may be that of a service, whose these are.
   options.uds_address.clear();
+  options.driftfile.clear();
+  options.chrony_socket.clear();
+  options.ntp_shm_unit.reset();
+  options.output = Output::kText;
   options.duration.reset();
   options.socket.interface = options.interface;
   return options;

@@ -3,6 +3,7 @@
 #include "ftcs/daemon/ethercat/ptp_plant_source.h"
 
 #include <chrono>
+#include <filesystem>
 
 #include <gtest/gtest.h>
 
@@ -79,6 +80,20 @@ TEST(PtpPlantSource, follows_in_a_thread_of_its_own_and_ends_with_it) {
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds{20};
   while (!reading && std::chrono::steady_clock::now() < give_up) reading = (*source)->read({});
   EXPECT_TRUE(reading) << (*source)->reason();
+}
+
+// --ptp-config may name the file of a service that runs on the same host.
+TEST(PtpPlantSource, leaves_the_driftfile_of_its_configuration_to_whose_it_is) {
+  NetworkKernel kernel;
+  PtpOptions options = on_eth0();
+  options.driftfile = testing::TempDir() + "ftcs-plant-driftfile";
+  std::filesystem::remove(options.driftfile);
+  auto source = PtpPlantSource::start(kernel, options);
+  ASSERT_TRUE(source) << source.error();
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds{20};
+  while (!(*source)->read({}) && std::chrono::steady_clock::now() < give_up) continue;
+  source->reset();
+  EXPECT_FALSE(std::filesystem::exists(options.driftfile));
 }
 
 TEST(PtpPlantSource, without_the_interface_says_why_at_once) {

@@ -176,7 +176,8 @@ void Configurator::write_sync0(FrameWriter& writer, const SubDeviceInfo& device)
   writer.add_value(device.target(kFpwr, reg::kCyclicUnitControl), std::uint8_t{0});
   writer.add_value(device.target(kFpwr, reg::kSync0CycleTime),
                    static_cast<std::uint32_t>(config_.cycle.count()));
-  writer.add_value(device.target(kFpwr, reg::kSync1CycleTime), own.sync1_register(config_.cycle));
+  writer.add_value(device.target(kFpwr, reg::kSync1CycleTime),
+                   static_cast<std::uint32_t>(own.sync1_register(config_.cycle)));
   writer.add_value(device.target(kFpwr, reg::kSync0StartTime), sync0_start_ + shift);
   writer.add_value(device.target(kFpwr, reg::kDcActivation),
                    static_cast<std::uint8_t>(kActivate | (sync1 ? reg::kActivateSync1 : 0U)));

@@ -17,11 +17,12 @@ struct DriveSync {
   std::uint16_t sync1_cycles = 0;
   Nanoseconds sync1_shift{0};  ///< behind a SYNC0; from zero to below a cycle
 
-  /// The register 0x09A4 for it.
-  [[nodiscard]] constexpr std::uint32_t sync1_register(Nanoseconds cycle) const noexcept {
+  /// What the register 0x09A4, of 32 bits, holds for it.
+  [[nodiscard]] constexpr std::int64_t sync1_register(Nanoseconds cycle) const noexcept {
     const std::int64_t left_out = sync1_cycles > 0 ? sync1_cycles - 1 : 0;
-    return static_cast<std::uint32_t>(left_out * cycle.count() + sync1_shift.count());
+    return left_out * cycle.count() + sync1_shift.count();
   }
+  friend bool operator==(const DriveSync&, const DriveSync&) = default;
 };
 
 struct ConfiguratorConfig {
