@@ -155,6 +155,7 @@ void add_ptp_arguments(CLI::App& command, PtpArguments& arguments) {
   add_clock_flags(command, arguments);
   add_run_flags(command, arguments);
   add_network_flags(command, arguments);
+  add_rights_flags(command, arguments.rights, true);
   const auto add_setting = [&](const std::string& name, const std::string& help) {
     return command
         .add_option_function<std::string>(

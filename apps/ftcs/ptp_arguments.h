@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/ftcs/epoch_arguments.h"
+#include "apps/ftcs/rights.h"
 #include "apps/ftcs/steering_arguments.h"
 #include "ftcs/daemon/ptp_options.h"
 
@@ -29,6 +30,7 @@ struct PtpArguments {
   std::string chrony_socket;
   std::optional<int> ntp_shm_unit;
   SteeringArguments steering;
+  RightsArguments rights;
   EpochArguments epoch;
   std::optional<double> offset_gain;
   std::string converged_band;

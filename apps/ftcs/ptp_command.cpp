@@ -235,6 +235,11 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
     if (!options.uds_address_given) {
       options.uds_address = platform::writable_socket_path(daemon::kSocketName);
     }
+    if (const auto wrong = confine_to(rights_of(options), arguments->rights, &options.once_open)) {
+      fmt::print(stderr, "ftcs ptp: {}\n", *wrong);
+      exit_code = kRuntimeError;
+      return;
+    }
     platform::LinuxKernel kernel;
     exit_code = daemon::run_ptp(kernel, options);
   });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -117,6 +118,8 @@ struct PtpOptions {
   int summary_interval = 0;  ///< log2 of seconds
   Output output = Output::kText;
   std::optional<Duration> duration{};
+  /// Called when all is open that only root may open; returns what failed.
+  std::function<std::optional<std::string>()> once_open{};
 
   std::vector<std::string>
       notes;  ///< settings that mean less here than in ptp4l: logged at the start

@@ -50,6 +50,12 @@ int PtpPort::run(const std::function<bool()>& stop) {
     return kRuntimeError;
   }
   if (!open_management() || !open_feed()) return kRuntimeError;
+  if (options_.once_open) {
+    if (const auto wrong = options_.once_open()) {
+      log_(LogLevel::kError, "{}", *wrong);
+      return kRuntimeError;
+    }
+  }
   report_stamps();
   if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
   start(now());

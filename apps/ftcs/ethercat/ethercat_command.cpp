@@ -10,6 +10,7 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
 #include "apps/ftcs/output.h"
+#include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/daemon/ethercat/cycle_laws.h"
 #include "ftcs/daemon/ethercat/ethercat_run.h"
@@ -21,6 +22,7 @@ namespace {
 
 struct EthercatArguments {
   daemon::RunOptions options;
+  RightsArguments rights;
   std::string servo = "ftcs";
   Nanoseconds sync_interval{500'000'000};
   Nanoseconds band{5'000};
@@ -139,6 +141,10 @@ int with_options(EthercatArguments arguments, Run run) {
     return kUsageError;
   }
   if (!can_write_results({arguments.options.json, arguments.options.html})) return kRuntimeError;
+  if (const auto wrong = confine_to(rights_of(arguments.options), arguments.rights)) {
+    fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
+    return kRuntimeError;
+  }
   platform::LinuxKernel kernel;
   return run(kernel, arguments.options);
 }
@@ -300,10 +306,12 @@ void add_ethercat_command(CLI::App& app, int& exit_code) {
   daemon::RunOptions& options = arguments->options;
   CLI::App* scan = command->add_subcommand("scan", "what is on the wire");
   add_link_flags(*scan, options);
+  add_rights_flags(*scan, arguments->rights, false);
   scan->callback(
       [arguments, &exit_code] { exit_code = with_options(*arguments, daemon::scan_ethercat); });
   CLI::App* run = command->add_subcommand("run", "drives in OP, cycle in phase with their clock");
   add_link_flags(*run, options);
+  add_rights_flags(*run, arguments->rights, false);
   add_servo_flags(*run, *arguments);
   add_run_flags(*run, options);
   add_drive_flags(*run, options);

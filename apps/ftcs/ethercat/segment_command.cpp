@@ -7,6 +7,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/output.h"
+#include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
 #include "ftcs/daemon/ethercat/segment_server.h"
 #include "ftcs/platform/stop_flag.h"
@@ -17,6 +18,7 @@ namespace {
 
 struct SegmentArguments {
   daemon::SegmentOptions options;
+  RightsArguments rights;
   std::string udp;
   std::string topology = "line";
   std::string cable;
@@ -109,6 +111,12 @@ int run_segment(SegmentArguments arguments) {
   if (arguments.priority > 0) {
     static_cast<void>(platform::make_realtime(arguments.priority, arguments.cpu));
   }
+  const auto rights = rights_of_segment(!options.interface.empty(),
+                                        !options.json.empty() || !options.clock_csv.empty());
+  if (const auto wrong = confine_to(rights, arguments.rights)) {
+    fmt::print(stderr, "ftcs ethercat-segment: {}\n", *wrong);
+    return kRuntimeError;
+  }
   daemon::SegmentServer server(options, std::move(*link));
   fmt::print("{} drives in a {} on {}\n", options.drives, arguments.topology,
              options.interface.empty() ? fmt::format("UDP {}:{}", options.address, options.port)
@@ -156,6 +164,7 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
   command->add_option("--clock-csv", arguments->options.clock_csv,
                       "write CLOCK_MONOTONIC and the first drive's system time to this file, each "
                       "50 frames");
+  add_rights_flags(*command, arguments->rights, false);
   command->callback([arguments, &exit_code] { exit_code = run_segment(*arguments); });
 }
 

@@ -23,6 +23,7 @@ using Wrong = std::optional<std::string>;
 struct PhcArguments {
   daemon::PhcOptions options;
   SteeringArguments steering;
+  RightsArguments rights;
   EpochArguments epoch;
   std::string law;  ///< -E
   std::optional<double> proportional;
@@ -240,6 +241,7 @@ Wrong check_automatic(const PhcArguments& arguments, const daemon::PhcOptions& o
     return arguments.system_clock > 0 && !for_wait ? Wrong("-r is of -a, and -r -r of -w")
                                                    : std::nullopt;
   }
+  if (!arguments.rights.user.empty()) return "--user: not with -a, which opens clocks as it goes";
   if (arguments.system_clock == 0) return "-a needs -r: the system clock is what can follow";
   if (options.wait_for_port) return "-a and -w exclude each other";
   if (options.sink_ahead_s) return "-a and -O exclude each other";
@@ -273,12 +275,18 @@ void add_phc_command(CLI::App& app, int& exit_code) {
   add_clock_flags(*command, *arguments);
   add_servo_flags(*command, *arguments);
   add_reading_flags(*command, *arguments);
+  add_rights_flags(*command, arguments->rights, true);
   refuse_the_rest(*command);
   command->callback([arguments, &exit_code] {
     daemon::PhcOptions options = arguments->options;
     if (const auto wrong = complete(*arguments, options)) {
       fmt::print(stderr, "ftcs phc: {}\n", *wrong);
       exit_code = kUsageError;
+      return;
+    }
+    if (const auto wrong = confine_to(rights_of(options), arguments->rights, &options.once_open)) {
+      fmt::print(stderr, "ftcs phc: {}\n", *wrong);
+      exit_code = kRuntimeError;
       return;
     }
     platform::LinuxKernel kernel;

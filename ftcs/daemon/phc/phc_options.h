@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -45,6 +46,8 @@ struct PhcOptions {
   std::uint32_t samples_per_summary = 0;
   int log_level = 6;
   std::optional<Duration> duration{};
+  /// Called when all is open that only root may open; returns what failed.
+  std::function<std::optional<std::string>()> once_open{};
 };
 
 }  // namespace ftcs::daemon

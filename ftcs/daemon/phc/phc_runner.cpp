@@ -385,6 +385,9 @@ int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log) {
   auto runner = PhcRunner::open(kernel, options, log);
   if (!runner) return refuse(runner.error());
   if (watch) (*runner)->follow_port(std::move(*watch), std::nullopt);
+  if (options.once_open) {
+    if (const auto wrong = options.once_open()) return refuse(*wrong);
+  }
   return (*runner)->run();
 }
 
