@@ -170,13 +170,18 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   if (early && in.credit[best_] < kUnlikely) search_.alarm(kLooksEarly);
   const std::uint32_t overtaken = detector_.add(in.log_density);
   const auto jump = jumps_.judge(detector_.lead(best_));
-  if (jump == JumpWatch::Verdict::kJumped) {
+  // Late messages that agree by chance or by the length of a frame are no jump:
+  // it brings an early one, or none is at the floor any more.
+  const bool shows = early_ > 0 || paths_.forward.dry + paths_.backward.dry > kTooDry;
+  if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
+  if (jump == JumpWatch::Verdict::kJumped && shows) {
     bank_.start(jumps_.estimate());
     detector_.clear();
     jumps_.clear();
     search_.alarm(kLooksEarly);
+    return;
   }
-  if (jump != JumpWatch::Verdict::kNothing) return;
+  if (jump == JumpWatch::Verdict::kWait) return;
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
