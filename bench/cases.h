@@ -132,7 +132,7 @@ struct BenchSource final : FreeRunningSource {
 struct DisciplineCase {
   BenchSource source{};
   VirtualClock clock{source, {.free_running = {}, .local = {}, .rate = {}, .limits = {}}};
-  ClockDiscipline discipline{DisciplineConfig{.servo = {.kind = ServoKind::kFtcs}}, clock};
+  ClockDiscipline discipline{DisciplineConfig{{}, {.kind = ServoKind::kFtcs}}, clock};
   Telemetry step() noexcept {
     source.world.next();
     (void)discipline.on_pair(source.world.forward());

@@ -6,12 +6,13 @@
 
 #include <gtest/gtest.h>
 
-#include "apps/ftcs/live_view.h"
+#include "ftcs/daemon/live_view.h"
 #include "test/support/manual_source.h"
 
 namespace ftcs::app {
 namespace {
 using namespace std::chrono_literals;
+using daemon::offset_plot;
 
 class World {
  public:

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "ftcs/daemon/ptp_port.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::daemon {
 
@@ -56,7 +57,7 @@ class PtpCorePort : public PtpPort {
   }
   [[nodiscard]] Stamp stamp_of(FreeRunningTime instant) {
     if constexpr (std::is_same_v<Stamp, ReferenceTime>) {
-      return ReferenceTime{clock().local_at(instant).since_epoch()};
+      return relabel<ReferenceTime>(clock().local_at(instant));
     } else {
       return instant;
     }

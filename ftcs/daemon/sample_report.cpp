@@ -127,23 +127,6 @@ std::string csv_line(const SampleRecord& record) {
   return line;
 }
 
-void SampleStatistics::add(double value) noexcept {
-  ++count_;
-  const double distance = value - mean_;
-  mean_ += distance / static_cast<double>(count_);
-  squares_ += distance * (value - mean_);
-  sum_of_squares_ += value * value;
-  largest_ = std::max(largest_, std::abs(value));
-}
-
-double SampleStatistics::deviation() const noexcept {
-  return count_ == 0 ? 0.0 : std::sqrt(squares_ / static_cast<double>(count_));
-}
-
-double SampleStatistics::rms() const noexcept {
-  return count_ == 0 ? 0.0 : std::sqrt(sum_of_squares_ / static_cast<double>(count_));
-}
-
 void SampleSummary::add(const SampleRecord& record) noexcept {
   offset_.add(record.offset.ns());
   frequency_.add(ptp4l_frequency_ppb(record.telemetry));
@@ -151,9 +134,14 @@ void SampleSummary::add(const SampleRecord& record) noexcept {
 }
 
 std::string SampleSummary::text() const {
+  // Divisor n, as ptp4l.
+  const auto deviation = [](const RunningStatistics& values) {
+    const auto n = static_cast<double>(values.count());
+    return n > 1.0 ? values.standard_deviation() * std::sqrt((n - 1.0) / n) : 0.0;
+  };
   return fmt::format("rms {:4.0f} max {:4.0f} freq {:+6.0f} +/- {:3.0f} delay {:5.0f} +/- {:3.0f}",
-                     offset_.rms(), offset_.largest(), frequency_.mean(), frequency_.deviation(),
-                     delay_.mean(), delay_.deviation());
+                     offset_.rms(), offset_.max_absolute(), frequency_.mean(),
+                     deviation(frequency_), delay_.mean(), deviation(delay_));
 }
 
 }  // namespace ftcs::daemon

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "ftcs/analysis/statistics.h"
 #include "ftcs/discipline/telemetry.h"
 #include "ftcs/time/duration.h"
 
@@ -35,40 +36,20 @@ struct SampleRecord {
 [[nodiscard]] std::string csv_header();
 [[nodiscard]] std::string csv_line(const SampleRecord& record);
 
-/// Mean, standard deviation (divisor n, as ptp4l) and greatest magnitude of what was added. Its
-/// name differs from that of ftcs::RunningStatistics, which it would hide from other headers of
-/// this folder.
-class SampleStatistics {
- public:
-  void add(double value) noexcept;
-  void reset() noexcept { *this = {}; }
-  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  [[nodiscard]] double mean() const noexcept { return mean_; }
-  [[nodiscard]] double deviation() const noexcept;
-  [[nodiscard]] double rms() const noexcept;
-  [[nodiscard]] double largest() const noexcept { return largest_; }
-
- private:
-  std::uint64_t count_ = 0;
-  double mean_ = 0.0;
-  double squares_ = 0.0;  // sum of squared distances from the mean
-  double sum_of_squares_ = 0.0;
-  double largest_ = 0.0;
-};
-
 /// ptp4l's summary: "rms ... max ... freq ... +/- ... delay ... +/- ...".
 class SampleSummary {
  public:
   void add(const SampleRecord& record) noexcept;
   void reset() noexcept { *this = {}; }
   [[nodiscard]] std::uint64_t count() const noexcept { return offset_.count(); }
-  [[nodiscard]] double offset_rms() const noexcept { return offset_.rms(); }
+  /// 0 before the first sample.
+  [[nodiscard]] double offset_rms() const noexcept { return count() == 0 ? 0.0 : offset_.rms(); }
   [[nodiscard]] std::string text() const;
 
  private:
-  SampleStatistics offset_;
-  SampleStatistics frequency_;
-  SampleStatistics delay_;
+  RunningStatistics offset_;
+  RunningStatistics frequency_;
+  RunningStatistics delay_;
 };
 
 }  // namespace ftcs::daemon

@@ -69,13 +69,16 @@ TEST(SampleReport, the_summary_is_rms_and_mean_and_deviation) {
   EXPECT_EQ(summary.text(), "rms    4 max    4 freq +50000 +/-   0 delay  2500 +/-   0");
 }
 
-TEST(SampleStatistics, agrees_with_the_definition) {
-  SampleStatistics statistics;
-  for (const double value : {1.0, 2.0, -4.0}) statistics.add(value);
-  EXPECT_DOUBLE_EQ(statistics.mean(), -1.0 / 3.0);
-  EXPECT_DOUBLE_EQ(statistics.rms(), std::sqrt(7.0));
-  EXPECT_DOUBLE_EQ(statistics.deviation(), std::sqrt(7.0 - 1.0 / 9.0));
-  EXPECT_DOUBLE_EQ(statistics.largest(), 4.0);
+TEST(SampleReport, the_deviations_of_the_summary_have_the_divisor_n) {
+  SampleSummary summary;
+  EXPECT_EQ(summary.offset_rms(), 0.0);
+  SampleRecord record = sample();
+  for (const int delay : {100, 200, -400}) {
+    record.telemetry.servo.path_delay = Duration::from_whole_ns(delay);
+    summary.add(record);
+  }
+  // sqrt(70000 - 1000 / 9 * 10) = 262.5; with the divisor n - 1 it would be 321.5.
+  EXPECT_NE(summary.text().find("delay   -33 +/- 262"), std::string::npos) << summary.text();
 }
 
 }  // namespace

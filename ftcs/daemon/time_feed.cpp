@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "ftcs/ptp/wire/message.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::daemon {
 namespace {
@@ -67,7 +68,7 @@ void TimeFeed::publish(const FollowerRecord& record, LocalTime local, FreeRunnin
                        std::int64_t realtime_ns) {
   const std::uint64_t used = record.discipline().counters().used;
   if (!record.locked() || used == std::exchange(told_, used)) return;
-  const ReferenceTime reference{local.since_epoch()};
+  const auto reference = relabel<ReferenceTime>(local);
   if (!utc_.admits(reference, event, realtime_ns)) return;
   const node::UtcFollower& utc = utc_.follower();
   utc_s_ = reference.since_epoch().floor_ns() / kNsPerSecond - utc.utc_offset();

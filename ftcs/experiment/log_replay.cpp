@@ -10,6 +10,7 @@
 #include "ftcs/analysis/statistics.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/sim/settable_source.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::experiment {
 namespace {
@@ -111,7 +112,7 @@ class Replay {
  public:
   Replay(const RecordedLog& log, std::string name, const DisciplineConfig& config)
       : log_(log),
-        clock_(source_, {first(), LocalTime{first().since_epoch()}, Rate{},
+        clock_(source_, {first(), relabel<LocalTime>(first()), Rate{},
                          RateLimits::symmetric_ppb(kRateLimitPpb)}),
         discipline_(config, clock_),
         judge_(log, std::move(name)) {}

@@ -8,6 +8,7 @@
 
 #include "ftcs/clock/affine_map.h"
 #include "ftcs/clock/command_check.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::platform {
 namespace {
@@ -62,7 +63,7 @@ KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_
   held_rate_ = tracking_rate_ = *rate;
   const LocalTime local = local_of(reading->clock_ns);
   const FreeRunningTime free = device_.is_system() ? FreeRunningTime::from_ns(reading->raw_ns)
-                                                   : FreeRunningTime{local.since_epoch()};
+                                                   : relabel<FreeRunningTime>(local);
   history_ = SteeringHistory{starting_at(free, local, held_rate_)};
   latest_ = {free, local};
   latest_raw_ns_ = reading->raw_ns;

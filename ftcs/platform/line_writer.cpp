@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -55,5 +56,12 @@ void LineWriter::flush() {
 }
 
 std::uint64_t LineWriter::take_lost() { return std::exchange(lost_, 0); }
+
+std::size_t terminal_columns() noexcept {
+  constexpr std::size_t kUsual = 80;
+  winsize size{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kUsual;
+  return size.ws_col;
+}
 
 }  // namespace ftcs::platform

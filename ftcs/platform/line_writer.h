@@ -39,4 +39,7 @@ class LineWriter {
   int error_ = 0;
 };
 
+/// Width of the terminal behind standard output; 80 where that is none, or does not tell.
+[[nodiscard]] std::size_t terminal_columns() noexcept;
+
 }  // namespace ftcs::platform

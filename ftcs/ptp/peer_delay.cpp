@@ -8,6 +8,7 @@
 
 #include "ftcs/ptp/interval.h"
 #include "ftcs/ptp/wire/fields.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::ptp {
 namespace {
@@ -26,7 +27,7 @@ constexpr Duration kInstantSpacing{Nanoseconds{125'000'000}};
 constexpr Duration kLargestCorrection{Nanoseconds{1'000'000'000}};
 
 /// A reading of the port's clock as it stands on the wire.
-ReferenceTime on_wire(FreeRunningTime time) noexcept { return ReferenceTime{time.since_epoch()}; }
+ReferenceTime on_wire(FreeRunningTime time) noexcept { return relabel<ReferenceTime>(time); }
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 
 #include "ftcs/ptp/interval.h"
 #include "ftcs/ptp/wire/fields.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::ptp {
 namespace {
@@ -29,7 +30,7 @@ PortConfig port_config(const TimeTransmitterConfig& config) noexcept {
 
 /// Our event clock is the reference; the peer delay mechanism only asks that it is one clock.
 FreeRunningTime event_clock(ReferenceTime stamp) noexcept {
-  return FreeRunningTime{stamp.since_epoch()};
+  return relabel<FreeRunningTime>(stamp);
 }
 
 }  // namespace

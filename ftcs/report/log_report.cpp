@@ -48,16 +48,27 @@ double counted_extent(const std::vector<double>& values) {
   return extent;
 }
 
-Plot offset_plot(const LogComparison& comparison) {
+/// One series of each servo that steers; `add` may put more beside it.
+template <class Add>
+Plot plot_of_servos(const LogComparison& comparison, std::string title,
+                    std::vector<double> experiment::ReplayResult::*values, const Add& add) {
   Plot plot;
-  plot.title = "Measured offset of the steered clock";
+  plot.title = std::move(title);
   plot.x_label = "time / s";
   plot.y_label = "local minus reference / ns";
   for (const auto& servo : comparison.servos) {
     if (servo.servo == "none") continue;
-    plot.series.push_back({servo.servo, servo.time_s, servo.offset_ns, {}, {}});
-    plot.y_extent = std::max(plot.y_extent, counted_extent(servo.offset_ns));
+    plot.series.push_back({servo.servo, servo.time_s, servo.*values, {}, {}});
+    plot.y_extent = std::max(plot.y_extent, counted_extent(servo.*values));
+    add(plot, servo);
   }
+  return plot;
+}
+
+Plot offset_plot(const LogComparison& comparison) {
+  Plot plot = plot_of_servos(comparison, "Measured offset of the steered clock",
+                             &experiment::ReplayResult::offset_ns,
+                             [](Plot&, const experiment::ReplayResult&) {});
   plot.note = "The scale is that of the second half, which is counted; the start may go beyond it.";
   return plot;
 }
@@ -65,14 +76,7 @@ Plot offset_plot(const LogComparison& comparison) {
 /// True error, and the deviation that the servo states: honest where the error stays between its
 /// lines.
 Plot error_plot(const LogComparison& comparison) {
-  Plot plot;
-  plot.title = "True time error, with the stated deviation (3 sigma)";
-  plot.x_label = "time / s";
-  plot.y_label = "local minus reference / ns";
-  for (const auto& servo : comparison.servos) {
-    if (servo.servo == "none") continue;
-    plot.series.push_back({servo.servo, servo.time_s, servo.time_error_ns, {}, {}});
-    plot.y_extent = std::max(plot.y_extent, counted_extent(servo.time_error_ns));
+  const auto add_stated = [](Plot& plot, const experiment::ReplayResult& servo) {
     const bool stated = std::any_of(servo.sigma_ns.begin(), servo.sigma_ns.end(),
                                     [](double sigma) { return std::isfinite(sigma); });
     for (const double side : {3.0, -3.0}) {
@@ -83,8 +87,9 @@ Plot error_plot(const LogComparison& comparison) {
       plot.y_extent = std::max(plot.y_extent, counted_extent(edge.y));
       plot.series.push_back(std::move(edge));
     }
-  }
-  return plot;
+  };
+  return plot_of_servos(comparison, "True time error, with the stated deviation (3 sigma)",
+                        &experiment::ReplayResult::time_error_ns, add_stated);
 }
 
 }  // namespace

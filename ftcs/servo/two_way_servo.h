@@ -6,6 +6,7 @@
 #include "ftcs/measurement/outlier_gate.h"
 #include "ftcs/measurement/path_delay_estimator.h"
 #include "ftcs/servo/servo.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs {
 
@@ -68,7 +69,7 @@ class TwoWayServo {
   /// it: on the steered clock, whatever was done to it in the meantime.
   [[nodiscard]] FreeRunningTime delay_stamp(const TimestampPair& pair) const noexcept {
     return config_.path_delay.rate_compensated ? pair.free_running
-                                               : FreeRunningTime{pair.local.since_epoch()};
+                                               : relabel<FreeRunningTime>(pair.local);
   }
   [[nodiscard]] SyncSample sample_of(const TimestampPair& pair) const noexcept {
     return {pair.reference, path_delay(), pair.local, pair.free_running};

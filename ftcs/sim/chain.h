@@ -7,6 +7,7 @@
 #include "ftcs/sim/node.h"
 #include "ftcs/sim/random.h"
 #include "ftcs/sim/two_way.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::sim {
 
@@ -45,7 +46,7 @@ class Chain {
   [[nodiscard]] ReferenceTime upstream_stamp(std::size_t index, TrueTime t) {
     if (index == 0) return reference_.stamp(t);
     Node& upstream = *nodes_[index - 1];
-    return ReferenceTime{upstream.clock.local_at(upstream.stamp(t)).since_epoch()};
+    return relabel<ReferenceTime>(upstream.clock.local_at(upstream.stamp(t)));
   }
 
   /// True error of a node's clock: local minus reference.

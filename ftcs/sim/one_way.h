@@ -9,6 +9,7 @@
 #include "ftcs/sim/quantiser.h"
 #include "ftcs/sim/random.h"
 #include "ftcs/sim/settable_source.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::sim {
 
@@ -55,7 +56,7 @@ void run_one_way(const OneWaySpec& spec, std::uint64_t seed, Law& law, Observer&
     const auto [reading, rate] = oscillator.state_at(now);
     source.set(reading);
     const ClockReading truth{reading, clock.local_at(reading)};
-    const ReferenceTime reference{now.since_epoch()};
+    const auto reference = relabel<ReferenceTime>(now);
     // The noise is a length of true time (it stands for delay), so the oscillator stretches it.
     const double noise_ns = spec.timestamp_noise_ns * noise.normal();
     const FreeRunningTime stamp = quantise(reading + Duration::from_ns(noise_ns * rate.ratio()));

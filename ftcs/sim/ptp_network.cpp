@@ -11,6 +11,7 @@
 #include "ftcs/ptp/time_transmitter.h"
 #include "ftcs/sim/chain.h"
 #include "ftcs/sim/event_queue.h"
+#include "ftcs/time/relabel.h"
 
 namespace ftcs::sim {
 namespace {
@@ -119,12 +120,12 @@ class PtpRun {
   /// The oscillator that drives a port's timers. The grandmaster's is true time.
   [[nodiscard]] FreeRunningTime port_now(const Event& at) {
     if (at.port == Port::kReceiver) return chain_.node(at.node).oscillator.reading_at(now_);
-    if (at.node == 0) return FreeRunningTime{now_.since_epoch()};
+    if (at.node == 0) return relabel<FreeRunningTime>(now_);
     return chain_.node(at.node - 1).oscillator.reading_at(now_);
   }
   [[nodiscard]] TrueTime true_time(const Event& at, FreeRunningTime reading) {
     if (at.port == Port::kReceiver) return chain_.node(at.node).oscillator.true_at(reading);
-    if (at.node == 0) return TrueTime{reading.since_epoch()};
+    if (at.node == 0) return relabel<TrueTime>(reading);
     return chain_.node(at.node - 1).oscillator.true_at(reading);
   }
 

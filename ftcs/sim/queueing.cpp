@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace ftcs::sim {
 namespace {
@@ -19,16 +20,19 @@ struct Length {
 };
 
 /// {share, octets} of each length; the shares sum up to 1.
-std::vector<Length> lengths_of(TrafficMix mix) {
+std::span<const Length> lengths_of(TrafficMix mix) {
+  static constexpr Length kFull[] = {{1.0, kFullFrame}};
+  static constexpr Length kModel1[] = {{0.80, 64.0}, {0.05, 576.0}, {0.15, kFullFrame}};
+  static constexpr Length kModel2[] = {{0.30, 64.0}, {0.10, 576.0}, {0.60, kFullFrame}};
   switch (mix) {
     case TrafficMix::kFullFrames:
       break;
     case TrafficMix::kG8261Model1:
-      return {{0.80, 64.0}, {0.05, 576.0}, {0.15, kFullFrame}};
+      return kModel1;
     case TrafficMix::kG8261Model2:
-      return {{0.30, 64.0}, {0.10, 576.0}, {0.60, kFullFrame}};
+      return kModel2;
   }
-  return {{1.0, kFullFrame}};
+  return kFull;
 }
 
 /// Mean length over that of a full frame.
@@ -76,8 +80,7 @@ double QueueingPort::utilisation_at(TrueTime now) {
 double QueueingPort::draw_service_ns() {
   if (load_.mix == TrafficMix::kFullFrames) return load_.service_ns;
   double pick = random_.uniform();
-  const auto lengths = lengths_of(load_.mix);
-  for (const Length& length : lengths) {
+  for (const Length& length : lengths_of(load_.mix)) {
     if (pick < length.share) return load_.service_ns * length.octets / kFullFrame;
     pick -= length.share;
   }

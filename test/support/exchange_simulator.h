@@ -13,7 +13,9 @@
 
 #include "ftcs/servo/servo.h"
 
-// A small two-way exchange for tests of whole servos, before and beside the project's simulator.
+// An oracle, and nothing else: a second simulator of two-way exchanges that shares no line with
+// ftcs/sim, so that what both agree on is no mistake of either. Servos are tested against it where
+// ftcs/sim stands above them; scenarios, networks and everything new belong to ftcs/sim.
 //
 // True time is the reference. The free-running clock has a frequency that is constant on a grid of
 // an eighth of a sync interval T. A Sync leaves at t0 + n T, a Delay_Req once per T at a uniformly

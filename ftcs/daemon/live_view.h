@@ -8,7 +8,7 @@
 #include "ftcs/experiment/servo_trial.h"
 #include "ftcs/report/table.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 /// |offset| on a logarithmic scale, one character each, the newest on the right: 10 ns is the
 /// lowest, 1 ms the highest of eight heights.
@@ -30,4 +30,4 @@ class LiveView {
   std::size_t drawn_lines_ = 0;
 };
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
+#include "ftcs/daemon/demo_receiver.h"
+
 #include <utility>
 #include <variant>
 
-#include "apps/ftcs/commands.h"
-#include "apps/ftcs/demo.h"
 #include "ftcs/analysis/statistics.h"
+#include "ftcs/daemon/exit_code.h"
 #include "ftcs/ptp/interval.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 namespace {
 
 /// Sync messages of a real system do not arrive on the dot. With T_c = T_sync one that is early by
@@ -36,7 +37,7 @@ std::vector<ServoConfig> demo_servos(const DemoOptions& demo, Nanoseconds interv
   return servos;
 }
 
-ptp::TimeReceiverConfig receiver_config(const daemon::PtpOptions& options) {
+ptp::TimeReceiverConfig receiver_config(const PtpOptions& options) {
   ptp::TimeReceiverConfig config;
   config.port = {*options.clock_identity, 1};
   config.domain = options.domain;
@@ -47,8 +48,8 @@ ptp::TimeReceiverConfig receiver_config(const daemon::PtpOptions& options) {
 
 }  // namespace
 
-DemoReceiver::DemoReceiver(platform::Kernel& kernel, const daemon::PtpOptions& options,
-                           const DemoOptions& demo, daemon::Log& log,
+DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
+                           const DemoOptions& demo, Log& log,
                            std::unique_ptr<platform::TimestampClock> timestamps,
                            platform::ChildProcess* transmitter)
     : PtpCorePort(kernel, options, log, std::move(timestamps), receiver_config(options)),
@@ -101,13 +102,13 @@ void DemoReceiver::housekeeping(FreeRunningTime) {
 int DemoReceiver::finish() {
   view_.finish();
   if (one_way_ns_.empty()) {
-    log()(daemon::LogLevel::kError, "no Sync message arrived on {} within {:.1f} s",
-          options().interface, seconds_since_start());
+    log()(LogLevel::kError, "no Sync message arrived on {} within {:.1f} s", options().interface,
+          seconds_since_start());
     return kRuntimeError;
   }
   interrupted_ = seconds_since_start() < demo_.duration_s;
   if (interrupted_) {
-    log()(daemon::LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
+    log()(LogLevel::kWarning, "stopped after {:.1f} of {:g} s; the figures cover that",
           seconds_since_start(), demo_.duration_s);
   }
   return kSuccess;
@@ -130,4 +131,4 @@ DemoResult DemoReceiver::result() const {
   return result;
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include "apps/ftcs/live_view.h"
+#include "ftcs/daemon/live_view.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <string_view>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
-namespace ftcs::app {
+#include "ftcs/platform/line_writer.h"
+
+namespace ftcs::daemon {
 namespace {
 
 constexpr std::size_t kPlotWidth = 40;
@@ -28,13 +28,6 @@ std::string_view state_name(const Telemetry& telemetry) {
       return "holdover";
   }
   return "";
-}
-
-std::size_t terminal_columns() {
-  constexpr std::size_t kUsual = 80;
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kUsual;
-  return size.ws_col;
 }
 
 /// A line that the terminal does not wrap: wrapped ones would not be found again by the next
@@ -66,7 +59,7 @@ std::string offset_plot(std::span<const double> offsets_ns, std::size_t width) {
 void LiveView::draw(std::span<const experiment::ServoTrial* const> trials, double elapsed_seconds,
                     double total_seconds) {
   if (!enabled_) return;
-  const std::size_t columns = terminal_columns();
+  const std::size_t columns = platform::terminal_columns();
   std::string screen;
   if (drawn_lines_ > 0) screen += fmt::format("\x1b[{}A", drawn_lines_);
   screen += line(fmt::format("{:>13}  {:>13}  {:>13}  {:>14}  {:<8} ",
@@ -96,4 +89,4 @@ void LiveView::finish() {
   drawn_lines_ = 0;
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "ftcs/clock/adjustable_clock.h"
+#include "ftcs/discipline/jump_plan.h"
+#include "ftcs/discipline/lock_detector.h"
+#include "ftcs/discipline/rate_change_limit.h"
+#include "ftcs/discipline/step_policy.h"
+#include "ftcs/discipline/telemetry.h"
+#include "ftcs/servo/servo.h"
+
+namespace ftcs {
+
+/// What holds whatever the servo.
+struct DisciplineRules {
+  StepPolicy step{};
+  LockConfig lock{};
+  /// A larger offset is not steered but refused, message by message, and the clock keeps its rate:
+  /// a slew over seconds is a mistake of the set-up, or somebody's lie. Zero: no bound. Not asked
+  /// where the policy permits a step.
+  Nanoseconds largest_offset{0};
+  /// The rate of the clock changes by no more at a time, dimensionless. Zero: any. The adaptive
+  /// servo plans with it, any other is cut.
+  double largest_rate_change = 0.0;
+  /// Sync intervals without a usable sample before holdover: more than one or two lost messages. A
+  /// sample that the servo refused is usable for that while the clock is within what a lock means,
+  /// by the servo's deviation and by the sample's own word.
+  std::uint32_t missed_intervals_to_holdover = 4;
+};
+
+/// What the discipline has to know of its servo.
+struct ServoTraits {
+  RateLimits limits{};           ///< narrowed by the clock's own
+  RateLimits slewing{};          ///< what it uses of them to remove an offset
+  Nanoseconds sync_interval{0};  ///< zero: as the messages come
+  bool path_delay_is_fixed = false;
+  bool decides_steps = false;  ///< has thresholds of its own, and its start-up depends on them
+};
+
+/// The one place where a servo meets a clock.
+///
+/// Completes each message with what the steered clock showed, asks the servo, applies step policy
+/// and limits, and hands the command to the clock. The clock itself ends a correction after T_c
+/// (AdjustableClock), so that a lost message does no harm. Counts and reports; decides nothing
+/// about frequency or offset.
+///
+/// Of one servo, chosen by the program: nothing of any other is linked. ClockDiscipline has the
+/// one that its configuration names.
+template <ClockServo Servo>
+class BasicClockDiscipline {
+ public:
+  /// The clock must outlive the discipline. `make` gets the limits that servo and clock leave,
+  /// and returns the servo, which is made in place: some are too large for the stack.
+  template <class MakeServo>
+  BasicClockDiscipline(const DisciplineRules& rules, const ServoTraits& servo,
+                       AdjustableClock& clock, const MakeServo& make) noexcept
+      : config_(rules),
+        traits_(servo),
+        clock_(clock),
+        limits_(intersect(servo.limits, clock.rate_limits())),
+        servo_(make(limits_)),
+        lock_(rules.lock),
+        rate_change_(rules.largest_rate_change),
+        sync_interval_(servo.sync_interval) {}
+
+  /// Before the first message: from now on at this rate, which somebody knows already.
+  [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept;
+  /// `paces`: such pairs come once a Sync interval; the forward ones are the samples, make the
+  /// lock, and are missed when they stay away. Others are heard and no more.
+  Telemetry on_pair(const EventPair& pair, bool paces = true) noexcept;
+  /// To be called when nothing has come for a while, as often as liked: samples missing for
+  /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking
+  /// rate.
+  Telemetry on_silence() noexcept;
+  /// What the time transmitter says of its Sync interval; zero: nothing. Messages that come in a
+  /// burst are then not taken for a shorter one.
+  void on_announced_interval(Duration interval) noexcept { announced_interval_ = interval; }
+  /// From now on the path delay is estimated from messages of both directions, beginning at what
+  /// the configuration says, give or take `sigma_ns`; until the next reference. Nothing happens
+  /// where the servo cannot.
+  void free_path_delay(double sigma_ns) noexcept;
+  /// Another time transmitter: what was learnt about the old one is void; the clock keeps its
+  /// rate.
+  void on_new_reference() noexcept;
+  /// Local time itself was put elsewhere (another UTC offset): a new reference, and a beginning:
+  /// step policy is asked again as with the first offset.
+  void on_new_timescale() noexcept;
+  /// The same reference has jumped; positive: ahead. A new reference, and beyond
+  /// largest_offset a beginning, as on_new_timescale(). Tells what will happen.
+  JumpPlan on_reference_jump(Duration jump) noexcept;
+
+  [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
+  [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }
+  /// Never without a path delay: what it hides from the offset may be any length.
+  [[nodiscard]] bool locked() const noexcept {
+    return lock_.locked() && !in_holdover_ && path_delay_known();
+  }
+  /// It is configured, or this reference has answered.
+  [[nodiscard]] bool path_delay_known() const noexcept {
+    return traits_.path_delay_is_fixed || path_delay_measured_;
+  }
+
+ private:
+  void begin(const ClockReading& reading) noexcept;
+  void count(Direction direction, SampleVerdict verdict) noexcept;
+  [[nodiscard]] bool lock_survives(const TimestampPair& refused) const noexcept;
+  void note_sample(const EventPair& pair) noexcept;
+  void check_silence(const ClockReading& reading) noexcept;
+  void steer(const ServoCommand& wanted, Duration offset) noexcept;
+  [[nodiscard]] ServoCommand with_step(ServoCommand command, Duration offset) const noexcept;
+  [[nodiscard]] ServoCommand within_limits(ServoCommand command) noexcept;
+  [[nodiscard]] bool at_limit(const ServoCommand& command) const noexcept;
+  [[nodiscard]] bool refuses(Duration offset) const noexcept;
+  const Telemetry& finish() noexcept;
+  [[nodiscard]] ServoSnapshot known(ServoSnapshot snapshot) const noexcept;
+  [[nodiscard]] Duration slew_time(Duration jump) const noexcept;
+
+  DisciplineRules config_;
+  ServoTraits traits_;
+  AdjustableClock& clock_;
+  RateLimits limits_;
+  Servo servo_;
+  LockDetector lock_;
+  RateChangeLimit rate_change_;
+  bool path_delay_measured_ = false;
+  bool first_command_ = true;
+  bool in_holdover_ = false;
+  bool has_sample_ = false;
+  bool awaits_sample_ = false;  ///< of another reference, since waiting_since_
+  FreeRunningTime waiting_since_{};
+  EventPair last_sample_{};
+  /// Configured, or the shorter one of the last two gaps between samples: an outage is no
+  /// interval.
+  Duration sync_interval_{};
+  Duration last_gap_{};
+  Duration announced_interval_{};
+  Telemetry telemetry_{};
+  DisciplineCounters counters_{};
+};
+
+}  // namespace ftcs
+
+#include "ftcs/discipline/basic_clock_discipline_impl.h"
