@@ -8,6 +8,7 @@
 
 #include "board.h"
 #include "ftcs/clock/addend_clock.h"
+#include "ftcs/clock/register_clock.h"
 #include "ftcs/discipline/ftcs_cycle_servo.h"
 #include "ftcs/estimation/elementary.h"
 #include "ftcs/servo/adaptive/adaptive_servo.h"
@@ -144,6 +145,52 @@ void run_servo(const char* name, const Configs&... configs) {
   hash.print(name);
 }
 
+// Registers as hardware has them: the steered face alone can be read.
+class Registers final : public AddendRegister {
+ public:
+  explicit Registers(Source& source) : source_(source) {}
+  [[nodiscard]] LocalTime now() noexcept override { return line_(source_.now()); }
+  void write(std::uint32_t addend) noexcept override {
+    line_ =
+        line_.continued(source_.now(), Rate::from_ratio(static_cast<double>(addend) / kNominal));
+  }
+  void step(Duration by) noexcept override { line_ = line_.stepped(by); }
+  void alarm(LocalTime) noexcept override {}
+
+  static constexpr std::uint32_t kNominal = 0x4C30C30C;
+
+ private:
+  Source& source_;
+  AffineMap<FreeRunningTime, LocalTime> line_{
+      source_.now(), LocalTime::from_ns(1'700'000'000'001'000'000), Rate{}};
+};
+
+void run_register_clock(const char* name) {
+  Source source;
+  Registers registers(source);
+  RegisterClock& clock = *new (world_place) RegisterClock(
+      registers, {Registers::kNominal, Registers::kNominal, RateLimits::symmetric_ppb(1e8)});
+  static_assert(sizeof(RegisterClock) <= sizeof world_place);
+  FtcsServo& servo = *new (servo_place) FtcsServo;
+  Noise noise;
+  Hash hash;
+  std::int64_t reference = 1'700'000'000'000'000'000;
+  for (int n = 0; n < kSamples; ++n) {
+    const LocalTime stamp = registers.now() + Nanoseconds{noise.next()};
+    source.advance(300'000);
+    const ServoUpdate update = servo.update(
+        {ReferenceTime::from_ns(reference), Duration{}, stamp, clock.from_stamp(stamp)},
+        clock.read());
+    if (update.has_command) hash.add(std::uint64_t{clock.apply(update.command).ok()});
+    hash.add(std::uint64_t{clock.addend()});
+    add(hash, update);
+    source.advance(kInterval + 6'250 - 300'000);
+    clock.on_alarm();
+    reference += kInterval;
+  }
+  hash.print(name);
+}
+
 void run_elementary(const char* name) {
   Hash hash;
   for (int n = 0; n < 20'000; ++n) {
@@ -188,6 +235,7 @@ int main() {
   run_law<PicsServo>("pics");
   run_law<LinuxptpPiServo>("linuxptp-pi");
   run_servo<TwoWayServo<FtcsServo>>("two-way ftcs", TwoWayConfig{}, FtcsConfig{});
+  run_register_clock("ftcs on an addend register");
   run_elementary("exp, log, scaled erfc");
   run_servo<SmallAdaptiveServo>("small adaptive", AdaptiveConfig{});
   run_servo<AdaptiveServo>("adaptive", AdaptiveConfig{});

@@ -87,8 +87,10 @@ for cpu in m4f m7 m0plus; do
   if arm-none-eabi-nm -u "${objects[@]}" | grep -E '__aeabi_(d|f|i2|ui2|l2|ul2)|malloc|_sbrk'; then
     fail "ftcs_addend for $cpu reaches for floating point or a heap"
   fi
-  arm-none-eabi-gcc "${target[@]}" "${common[@]}" "${strict[@]}" -Wno-missing-prototypes -c examples/embedded/stm32_ptp_clock.c \
-    -o "$out/$cpu/stm32.o"
+  for example in stm32_ptp_clock bare_metal; do
+    arm-none-eabi-gcc "${target[@]}" "${common[@]}" "${strict[@]}" -Wno-missing-prototypes -c examples/embedded/$example.c \
+      -o "$out/$cpu/$example.o"
+  done
   arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Werror \
     -I"$here/zephyr_stub" -c examples/embedded/zephyr/src/ftcs_ptp_servo.c -o "$out/$cpu/zephyr.o"
   arm-none-eabi-gcc "${target[@]}" "${common[@]}" -std=gnu99 "${startup[@]}" "$here/addend_run.c" "${objects[@]}" "${link[@]}" \
