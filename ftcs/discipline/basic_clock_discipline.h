@@ -92,6 +92,8 @@ class BasicClockDiscipline {
   /// largest_offset a beginning, as on_new_timescale(). Tells what will happen.
   JumpPlan on_reference_jump(Duration jump) noexcept;
 
+  /// Used since this reference is followed.
+  [[nodiscard]] std::uint32_t samples() const noexcept { return samples_; }
   [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
   [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }
   /// Never without a path delay: what it hides from the offset may be any length.
@@ -129,6 +131,7 @@ class BasicClockDiscipline {
   bool first_command_ = true;
   bool in_holdover_ = false;
   bool has_sample_ = false;
+  std::uint32_t samples_ = 0;
   bool awaits_sample_ = false;  ///< of another reference, since waiting_since_
   FreeRunningTime waiting_since_{};
   EventPair last_sample_{};

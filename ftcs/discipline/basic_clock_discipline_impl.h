@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include "ftcs/discipline/basic_clock_discipline.h"
 
@@ -67,6 +69,7 @@ void BasicClockDiscipline<Servo>::on_new_reference() noexcept {
   lock_.reset();
   awaits_sample_ = has_sample_ || awaits_sample_;
   has_sample_ = false;
+  samples_ = 0;
   waiting_since_ = clock_.read().free_running;
   last_gap_ = Duration{};
   announced_interval_ = Duration{};
@@ -170,6 +173,7 @@ void BasicClockDiscipline<Servo>::note_sample(const EventPair& pair) noexcept {
   }
   last_sample_ = pair;
   has_sample_ = true;
+  if (samples_ < std::numeric_limits<std::uint32_t>::max()) ++samples_;
   awaits_sample_ = false;
   in_holdover_ = false;
 }
