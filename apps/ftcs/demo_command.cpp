@@ -7,15 +7,24 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/demo.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
-#include "ftcs/daemon/ethercat/ethercat_demo.h"
+#include "ftcs/daemon/demo_report.h"
 #include "ftcs/daemon/ptp_transmitter.h"
 
 namespace ftcs::app {
 namespace {
+
+using daemon::DemoOptions;
+using daemon::DemoReceiver;
+using daemon::DemoResult;
+
+/// Where the figures go; empty: nowhere.
+struct DemoFiles {
+  std::string json;
+  std::string html;
+};
 
 /// The two processes share their ports with each other, so that the system would let a third one
 /// in: two demonstrations on one port hear each other. Whoever asks for a port alone is refused.
@@ -155,21 +164,22 @@ int run_ptp_demo(const DemoOptions& demo, DemoResult& result) {
   if (const int code = receiver.run(); code != kSuccess) return code;
   result = receiver.result();
   result.timestamps = timestamps;
-  fmt::print("{}", demo_text(demo, result));
+  fmt::print("{}", daemon::demo_text(demo, result));
   std::fflush(stdout);
   return kSuccess;
 }
 
 int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResult* result,
                 const daemon::EthercatDemo* ethercat) {
-  bool written = files.json.empty() || write_result(files.json, demo_json(demo, result, ethercat));
-  written &= files.html.empty() || write_result(files.html, demo_html(demo, result, ethercat));
+  bool written =
+      files.json.empty() || write_result(files.json, daemon::demo_json(demo, result, ethercat));
+  written &=
+      files.html.empty() || write_result(files.html, daemon::demo_html(demo, result, ethercat));
   if (!files.html.empty() && written) fmt::print("\nreport: {}\n", files.html);
   return written ? kSuccess : kRuntimeError;
 }
 
-}  // namespace
-
+/// Runs both parts; prints tables and sentences. Returns an exit code: both locked or not.
 int run_demo(const DemoOptions& demo, const DemoFiles& files) {
   if (!can_write_results({files.json, files.html})) return kRuntimeError;
   DemoResult result;
@@ -192,6 +202,8 @@ int run_demo(const DemoOptions& demo, const DemoFiles& files) {
       (!ethercat->runs.empty() && ethercat->runs.front()->decision().state == CycleState::kLocked);
   return ptp_locked && ethercat_locked ? kSuccess : kNotLocked;
 }
+
+}  // namespace
 
 void add_demo_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("demo",

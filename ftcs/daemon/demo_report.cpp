@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
+#include "ftcs/daemon/demo_report.h"
+
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "apps/ftcs/demo.h"
-#include "ftcs/daemon/ethercat/ethercat_demo.h"
 #include "ftcs/report/json.h"
 #include "ftcs/report/table.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 Table demo_table(const DemoResult& result) {
   Table table({"servo", "locked", "cycles to lock", "true error, RMS", "offset it sees, RMS",
@@ -75,12 +75,12 @@ void add_ptp(Json& root, const DemoOptions& options, const DemoResult& result) {
 }  // namespace
 
 std::string demo_json(const DemoOptions& options, const DemoResult* result,
-                      const daemon::EthercatDemo* ethercat) {
+                      const EthercatDemo* ethercat) {
   Json root;
   root["duration_s"] = options.duration_s;
   if (result != nullptr) add_ptp(root, options, *result);
-  if (ethercat != nullptr) root["ethercat"] = daemon::ethercat_demo_json(*ethercat);
+  if (ethercat != nullptr) root["ethercat"] = ethercat_demo_json(*ethercat);
   return dump(root);
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon

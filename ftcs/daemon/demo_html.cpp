@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 
-#include "apps/ftcs/demo.h"
-#include "ftcs/daemon/ethercat/ethercat_demo.h"
+#include "ftcs/daemon/demo_report.h"
 #include "ftcs/daemon/ethercat/run_html.h"
 #include "ftcs/report/html_report.h"
 
-namespace ftcs::app {
+namespace ftcs::daemon {
 
 namespace {
 
@@ -33,7 +32,7 @@ std::string lock_text(const DemoResult& result) {
 }  // namespace
 
 std::string demo_html(const DemoOptions& options, const DemoResult* result,
-                      const daemon::EthercatDemo* ethercat) {
+                      const EthercatDemo* ethercat) {
   HtmlReport report("Frequency-tracking clock servo: demonstration",
                     "A clock locked over PTP, and the cycle of eight EtherCAT drives");
   std::vector<LabelledText> figures;
@@ -42,7 +41,7 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
                          lock_text(*result));
   }
   if (ethercat != nullptr && !ethercat->runs.empty()) {
-    const daemon::MainRunner& run = *ethercat->runs.front();
+    const MainRunner& run = *ethercat->runs.front();
     const double intervals = static_cast<double>(run.figures().lock_cycle) /
                              static_cast<double>(run.options().servo.cycles_per_sync);
     figures.emplace_back(fmt::format("EtherCAT, {}: locked after", run.options().servo_name),
@@ -57,9 +56,9 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
     report.add_plot(offset_plot_of(*result));
   }
   if (ethercat != nullptr) {
-    daemon::add_run_sections(report, ethercat->views());
+    add_run_sections(report, ethercat->views());
     report.add_table("EtherCAT: what the drives saw in the last run",
-                     daemon::drives_table(ethercat->segment->server()));
+                     drives_table(ethercat->segment->server()));
   }
   report.add_parameters({{"version", FTCS_VERSION},
                          {"duration of the PTP part", fmt::format("{:g} s", options.duration_s)},
@@ -67,4 +66,4 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
   return report.render();
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs::daemon
