@@ -81,13 +81,25 @@ class AddendRegister {
 };
 
 // Outside of 200 us the whole offset is removed at once: the noise of polling is not for p.
-const ftcs_addend_config kServo = {kNominal,   10'000,  100'000,     4096, 200'000,
-                                   1'000'000,  kLockNs, 2 * kLockNs, 0,    0,
-                                   10'000'000, 1,       0,           0};
+const ftcs_addend_config kServo = [] {
+  ftcs_addend_config config = ftcs_addend_default_config(kNominal);
+  config.limit_ppm = 10'000;
+  config.plausible_ppm = 100'000;
+  config.band_enter_ns = 200'000;
+  config.band_leave_ns = 1'000'000;
+  config.lock_enter_ns = kLockNs;
+  config.lock_leave_ns = 2 * kLockNs;
+  config.step_ns = 10'000'000;
+  return config;
+}();
 
 class Node {
  public:
-  Node() : receiver_(config()) { ftcs_addend_init(&servo_, &kServo, kNominal); }
+  Node() : receiver_(config()) {
+    if (ftcs_addend_init(&servo_, &kServo, kNominal) != FTCS_ADDEND_OK) {
+      board_write("configuration refused\n");
+    }
+  }
 
   bool run() {
     lan9118_start();
