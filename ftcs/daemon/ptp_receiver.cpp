@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/port_config.h"
 #include "ftcs/daemon/status_report.h"
 
 namespace ftcs::daemon {
@@ -16,18 +17,9 @@ node::ReceiverNodeConfig receiver_node_config(const PtpOptions& options, const P
   node::ReceiverNodeConfig node;
   node.follower = follower_config(options, facts.hardware_stamps, learnt);
   ptp::TimeReceiverConfig& config = node.port;
-  config.port = facts.identity;
-  config.domain = options.domain;
-  config.major_sdo_id = options.major_sdo_id;
-  config.minor_version = options.minor_version;
-  config.log_announce_interval = options.log_announce_interval;
+  config = port_config<ptp::TimeReceiverConfig>(options, facts.identity);
   config.announce_receipt_timeout = options.announce_receipt_timeout;
-  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
-  config.unicast = options.socket.unicast.has_value();
   config.hybrid = options.hybrid;
-  config.delay_mechanism = options.delay_mechanism;
-  config.peer_delay = options.peer_delay_config();
-  config.assume_two_step = options.assume_two_step;
   config.sync_receipt_timeout = options.sync_receipt_timeout;
   config.acceptable = options.acceptable;
   config.fast_start = options.fast_start;

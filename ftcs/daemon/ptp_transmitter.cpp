@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/port_config.h"
 #include "ftcs/daemon/status_report.h"
 
 namespace ftcs::daemon {
@@ -11,23 +12,13 @@ namespace {
 
 ptp::TimeTransmitterConfig core_config(const PtpOptions& options,
                                        const ptp::PortIdentity& identity) {
-  ptp::TimeTransmitterConfig config;
-  config.port = identity;
-  config.domain = options.domain;
-  config.major_sdo_id = options.major_sdo_id;
-  config.minor_version = options.minor_version;
-  config.log_announce_interval = options.log_announce_interval;
+  auto config = port_config<ptp::TimeTransmitterConfig>(options, identity);
   config.log_sync_interval = options.log_sync_interval;
-  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
   config.priority1 = options.priority1;
   config.priority2 = options.priority2;
   config.quality = options.quality;
   config.utc_offset = options.utc_offset;
   config.time_source = options.time_source;
-  config.unicast = options.socket.unicast.has_value();
-  config.delay_mechanism = options.delay_mechanism;
-  config.peer_delay = options.peer_delay_config();
-  config.assume_two_step = options.assume_two_step;
   config.follow_up_info = options.follow_up_info;
   config.path_trace = options.path_trace;
   return config;
