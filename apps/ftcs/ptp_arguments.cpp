@@ -114,6 +114,8 @@ void add_run_flags(CLI::App& command, PtpArguments& arguments) {
   Flags flags(command);
   flags.value("--ptp4l-socket", arguments.ptp4l_socket, "PATH",
               "with --source ptp4l: its uds_address; default /var/run/ptp4l");
+  flags.value("--time-page", arguments.time_page, "PATH",
+              "for programs with ftcs_now.h: the time, and between which instants it surely is");
   flags.value("--chrony-sock", arguments.chrony_socket, "PATH",
               "samples for chronyd: the path of its refclock SOCK");
   flags

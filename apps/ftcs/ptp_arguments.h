@@ -28,6 +28,7 @@ struct PtpArguments {
   std::string source;
   std::string ptp4l_socket;
   std::string chrony_socket;
+  std::string time_page;
   std::optional<int> ntp_shm_unit;
   SteeringArguments steering;
   RightsArguments rights;

@@ -161,6 +161,10 @@ Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) 
 }
 
 Wrong apply_feed(const PtpArguments& arguments, daemon::PtpOptions& options) {
+  options.time_page = arguments.time_page;
+  if (!options.time_page.empty() && options.role == daemon::Role::kTimeTransmitter) {
+    return "--time-page: a time transmitter follows nobody";
+  }
   options.chrony_socket = arguments.chrony_socket;
   options.ntp_shm_unit = arguments.ntp_shm_unit;
   if (options.chrony_socket.empty() && !options.ntp_shm_unit) return std::nullopt;

@@ -46,7 +46,8 @@ Confinement rights_of(const daemon::PtpOptions& options) {
   }
   if (options.ntp_shm_unit) rights.calls.push_back(SystemCalls::kSharedMemory);
   if (!options.driftfile.empty()) rights.calls.push_back(SystemCalls::kThreads);
-  write_files(rights, !options.driftfile.empty() || !options.chrony_socket.empty());
+  write_files(rights, !options.driftfile.empty() || !options.chrony_socket.empty() ||
+                          !options.time_page.empty());
   return rights;
 }
 

@@ -111,6 +111,7 @@ struct PtpOptions {
   std::string uds_address;
   bool uds_address_given = false;
 
+  std::string time_page{};            ///< file for ftcs_now.h; empty: none
   std::string chrony_socket{};        ///< refclock SOCK of a chronyd; empty: none
   std::optional<int> ntp_shm_unit{};  ///< NTP's shared memory; none: none
 

@@ -49,7 +49,7 @@ int PtpPort::run(const std::function<bool()>& stop) {
     log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
   }
-  if (!open_management() || !open_feed()) return kRuntimeError;
+  if (!open_management() || !open_feed() || !open_time_page()) return kRuntimeError;
   if (options_.once_open) {
     if (const auto wrong = options_.once_open()) {
       log_(LogLevel::kError, "{}", *wrong);
@@ -89,6 +89,26 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (management_) management_->serve(*managed(), now());
   housekeeping(now());
   log_.flush();
+}
+
+bool PtpPort::open_time_page() {
+  if (options_.time_page.empty()) return true;
+  auto page = platform::TimePage::open(options_.time_page);
+  if (page) {
+    publisher_.emplace(std::move(*page));
+  } else {
+    log_(LogLevel::kError, "--time-page: {}", page.error().message());
+  }
+  return page.ok();
+}
+
+void PtpPort::publish_time(const TimeBound& bound) {
+  if (!publisher_) return;
+  RawReading reading;
+  reading.before_ns = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  reading.free_running = now();
+  reading.after_ns = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+  publisher_->publish(bound, reading);
 }
 
 bool PtpPort::open_feed() {

@@ -22,6 +22,7 @@
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/service_report.h"
 #include "ftcs/daemon/time_feed.h"
+#include "ftcs/daemon/time_publisher.h"
 #include "ftcs/platform/ptp_transport.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/platform/timestamp_clock.h"
@@ -92,6 +93,8 @@ class PtpPort : private platform::TransportHandler {
   void fail(const std::string& reason);
   [[nodiscard]] bool has_failed() const { return failure_.has_value(); }
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
+  /// To the page of ftcs_now.h, if one was asked for.
+  void publish_time(const TimeBound& bound);
   [[nodiscard]] SkewedSource& oscillator() { return oscillator_; }
   [[nodiscard]] AdjustableClock& clock() {
     if (real_clock_ != nullptr) return real_clock_->clock();
@@ -119,6 +122,7 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] std::optional<platform::OsError> hand_over(const ptp::SendMessage& message);
   [[nodiscard]] bool open_management();
   [[nodiscard]] bool open_feed();
+  bool open_time_page();
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
 
@@ -132,6 +136,7 @@ class PtpPort : private platform::TransportHandler {
   RealClock* real_clock_;
   platform::PtpTransport transport_;
   std::optional<TimeFeed> feed_{};
+  std::optional<TimePublisher> publisher_;
   std::optional<ManagementServer> management_{};
   platform::SocketAddress sender_{};  ///< of the message that is being handled
   platform::SocketAddress transmitter_{};

@@ -133,6 +133,7 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   node_.on_silence(now);
   take_events(now);
   record_.follow_lock(now);
+  publish_time(time_bound(node_.discipline().latest(), node_.discipline().samples()));
   observer_.turn(now, totals());
   service().turn(now, node_.locked(), [this] { return service_sentence(); });
   if (real_clock() != nullptr) {

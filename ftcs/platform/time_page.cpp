@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/platform/time_page.h"
+
+#include <cerrno>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
+
+namespace ftcs::platform {
+namespace {
+
+constexpr std::size_t kSize = 4096;
+/// A writer that says nothing for so long is gone: it writes once a second at least.
+constexpr std::int64_t kFreshNs = 3'000'000'000;
+
+/// 0 or errno.
+int make_page(int file) {
+  struct stat status {};
+  if (::fstat(file, &status) != 0) return errno;
+  if (!S_ISREG(status.st_mode)) return EINVAL;
+  constexpr mode_t kReadable = 0644;
+  if (::fchmod(file, kReadable) != 0 || ::ftruncate(file, kSize) != 0) return errno;
+  return 0;
+}
+
+}  // namespace
+
+Result<TimePage, OsError> TimePage::open(const std::string& path) {
+  constexpr mode_t kReadable = 0644;
+  const auto failed = [&path](int code) { return os_error(code, "time page " + path); };
+  const int file =
+      ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kReadable);
+  if (file < 0) return failed(errno);
+  int code = make_page(file);
+  void* memory = MAP_FAILED;
+  if (code == 0) {
+    memory = ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    if (memory == MAP_FAILED) code = errno;
+  }
+  ::close(file);
+  if (code != 0) return failed(code);
+  TimePage page(static_cast<ftcs_time_page*>(memory));
+  page.page_->sequence = 0;
+  page.write({});
+  page.page_->version = FTCS_TIME_PAGE_VERSION;
+  page.page_->fresh_ns = kFreshNs;
+  __atomic_store_n(&page.page_->magic, FTCS_TIME_PAGE_MAGIC, __ATOMIC_RELEASE);
+  return page;
+}
+
+TimePage::TimePage(TimePage&& other) noexcept : page_(std::exchange(other.page_, nullptr)) {}
+
+TimePage::~TimePage() {
+  if (page_ == nullptr) return;
+  write({});
+  ::munmap(page_, kSize);
+}
+
+void TimePage::write(const Content& content) noexcept {
+  const std::uint32_t before = page_->sequence;
+  __atomic_store_n(&page_->sequence, before + 1, __ATOMIC_RELAXED);
+  __atomic_thread_fence(__ATOMIC_RELEASE);
+  page_->state = content.state;
+  page_->raw_ns = content.raw_ns;
+  page_->time_ns = content.time_ns;
+  page_->rate = content.rate;
+  page_->bound_ns = content.bound_ns;
+  page_->growth = content.growth;
+  __atomic_store_n(&page_->sequence, before + 2, __ATOMIC_RELEASE);
+}
+
+}  // namespace ftcs::platform
