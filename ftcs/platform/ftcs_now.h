@@ -2,9 +2,9 @@
 #ifndef FTCS_NOW_H
 #define FTCS_NOW_H
 
-/* What time it is, and between which two instants it surely is: for programs in C and C++ on a machine
- * where `ftcs ptp --time-page PATH` runs. Needs nothing but this header and CLOCK_MONOTONIC_RAW, which the
- * vDSO reads:
+/* What time it is, and between which two instants it surely is: for programs in C and C++ on a
+ * machine where `ftcs ptp --time-page PATH` runs. Needs nothing but this header and
+ * CLOCK_MONOTONIC_RAW, which the vDSO reads:
  *
  *     const struct ftcs_time_page* page = ftcs_open_time("/run/ftcs-time");
  *     struct ftcs_time now;
@@ -42,11 +42,11 @@ struct ftcs_time_page {
   uint32_t version;
   uint32_t sequence;
   uint32_t state;
-  int64_t raw_ns;  /* CLOCK_MONOTONIC_RAW at the base */
-  int64_t time_ns; /* of the reference at the base, ns since its epoch */
-  double rate;     /* of the reference in units of CLOCK_MONOTONIC_RAW */
-  double bound_ns; /* half width at the base */
-  double growth;   /* of the half width, ns per ns */
+  int64_t raw_ns;   /* CLOCK_MONOTONIC_RAW at the base */
+  int64_t time_ns;  /* of the reference at the base, ns since its epoch */
+  double rate;      /* of the reference in units of CLOCK_MONOTONIC_RAW */
+  double bound_ns;  /* half width at the base */
+  double growth;    /* of the half width, ns per ns */
   int64_t fresh_ns; /* older than this, the writer counts as gone */
 };
 
@@ -56,7 +56,8 @@ struct ftcs_time {
   int64_t latest_ns;
 };
 
-/* Maps the page, to read. NULL with errno: it cannot be had. It stays mapped until the program ends. */
+/* Maps the page, to read. NULL with errno: it cannot be had. It stays mapped until the program
+ * ends. */
 static inline const struct ftcs_time_page* ftcs_open_time(const char* path) {
   const int file = open(path, O_RDONLY | O_CLOEXEC);
   void* page = NULL;
@@ -66,7 +67,8 @@ static inline const struct ftcs_time_page* ftcs_open_time(const char* path) {
   return page == MAP_FAILED ? NULL : (const struct ftcs_time_page*)page;
 }
 
-/* The interval at a given reading of CLOCK_MONOTONIC_RAW. Never waits for the writer more than a few tries. */
+/* The interval at a given reading of CLOCK_MONOTONIC_RAW. Never waits for the writer more than a
+ * few tries. */
 static inline enum ftcs_time_state ftcs_time_at(const struct ftcs_time_page* page, int64_t raw_ns,
                                                 struct ftcs_time* result) {
   int tries = 0;
@@ -82,7 +84,8 @@ static inline enum ftcs_time_state ftcs_time_at(const struct ftcs_time_page* pag
     const double half = page->bound_ns + page->growth * (double)(passed < 0 ? -passed : passed);
     const int64_t fresh = page->fresh_ns;
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
-    if ((before & 1u) != 0 || __atomic_load_n(&page->sequence, __ATOMIC_RELAXED) != before) continue;
+    if ((before & 1u) != 0 || __atomic_load_n(&page->sequence, __ATOMIC_RELAXED) != before)
+      continue;
     if (state == FTCS_UNKNOWN || !(half < 9e18)) return FTCS_UNKNOWN;
     result->time_ns = base + passed + (int64_t)extra;
     result->earliest_ns = result->time_ns - (int64_t)half - 2;
