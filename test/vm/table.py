@@ -4,8 +4,8 @@
 
   test/vm/table.py [build/vm/results]
 
-First `make test-vm` (and `test/vm/run busy_peer`). A cell: seconds until the error stays within the band (100 ns, with noise 1 us); then over the
-second half of the run RMS, mean, worst in ns.
+First `make test-vm` (and `test/vm/run busy_peer`). A cell: seconds until the error stays within the band (100 ns, with noise 1 us); then RMS,
+mean, worst in ns over what the job counts: the second half of the run where it says nothing else.
 """
 import pathlib
 import re
