@@ -3,6 +3,8 @@
 // are meant; no clock of it is opened.
 #include "ftcs/platform/clock_device.h"
 
+#include <array>
+#include <csignal>
 #include <cstddef>
 #include <cstdlib>
 #include <fcntl.h>
@@ -11,6 +13,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -151,6 +154,33 @@ TEST(ClockDevice, a_name_that_somebody_else_took_is_told_apart) {
   ASSERT_EQ(::bind(stranger, reinterpret_cast<const sockaddr*>(&address), size), 0);
   EXPECT_EQ(kernel.hold_name(name.c_str()), -EPERM) << "none of ours listens there";
   ::close(stranger);
+}
+
+// A service runs as a system account: root beside it steered the same clock.
+TEST(ClockDevice, a_name_that_a_service_holds_is_in_use_and_a_persons_is_told_apart) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can become somebody";
+  for (const uid_t holder : {uid_t{1}, uid_t{54'321}}) {
+    LinuxKernel kernel;
+    const std::string name = "ftcs test of user " + std::to_string(holder) + " " +
+                             std::to_string(kernel.clock_ns(CLOCK_MONOTONIC));
+    std::array<int, 2> ready{};
+    ASSERT_EQ(::pipe(ready.data()), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const bool held = ::setuid(holder) == 0 && kernel.hold_name(name.c_str()) >= 0;
+      (void)!::write(ready[1], held ? "y" : "n", 1);
+      ::pause();
+      ::_exit(0);
+    }
+    char held = 'n';
+    ASSERT_EQ(::read(ready[0], &held, 1), 1);
+    EXPECT_EQ(held, 'y');
+    EXPECT_EQ(kernel.hold_name(name.c_str()), holder == 1 ? -EADDRINUSE : -EPERM);
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    ::close(ready[0]);
+    ::close(ready[1]);
+  }
 }
 
 TEST(ClockDevice, missing_rights_are_found_without_touching_the_clock) {

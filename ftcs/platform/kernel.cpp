@@ -94,13 +94,15 @@ int LinuxKernel::set_timer(int fd, std::int64_t from_now_ns) noexcept {
 
 namespace {
 
-/// Whether who listens there is root or of our own user: anybody may take a name that is public.
+/// Whether who listens there is root, a system account, as services have, or of our own user:
+/// anybody may take a name that is public.
 bool is_held_by_ours(int fd, const sockaddr* address, socklen_t size) {
   if (::connect(fd, address, size) < 0) return errno == EAGAIN;  // a full queue is somebody's
   ucred holder{};
   socklen_t length = sizeof holder;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &holder, &length) != 0) return true;
-  return holder.uid == 0 || holder.uid == ::geteuid();
+  constexpr uid_t kFirstOfPeople = 1000;
+  return holder.uid < kFirstOfPeople || holder.uid == ::geteuid();
 }
 
 }  // namespace

@@ -47,8 +47,8 @@ class Kernel {
   [[nodiscard]] virtual int open_timer() noexcept = 0;
   [[nodiscard]] virtual int set_timer(int fd, std::int64_t from_now_ns) noexcept = 0;
   /// A name that one process of this host (network namespace) can hold, until the descriptor is
-  /// closed or the process ends. -EADDRINUSE: somebody does.
-  /// -EADDRINUSE: root or our own user holds it; -EPERM: somebody else does.
+  /// closed or the process ends. -EADDRINUSE: root, a system account or our own user holds it;
+  /// -EPERM: somebody else does.
   [[nodiscard]] virtual int hold_name(const char* name) noexcept = 0;
   /// Takes what is open there, file or device, for this process, until the descriptor is closed.
   /// -EWOULDBLOCK: another one has it, under whatever name it was opened.

@@ -34,7 +34,7 @@ struct RateSteps {
 /// Nothing is learnt from a clock that keeps to its commands, nor where the steps make less than
 /// readings are uncertain by.
 ///
-/// Sizes of 40 to 1000 ppb, to 5 %: finer ones make less than a nanosecond of a tenth of a second.
+/// Sizes of 40 to 500 ppb, to 3 %: finer ones make less than a nanosecond of a tenth of a second.
 class RateStepMeter {
  public:
   RateStepMeter();

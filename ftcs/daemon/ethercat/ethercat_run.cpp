@@ -59,7 +59,8 @@ using Body = int (*)(MainRunner& runner, const std::function<bool()>& stop);
 int with_runner(platform::Kernel& kernel, const RunOptions& options, Body body) {
   const std::string wire = wire_of(options);
   const int held = kernel.hold_name(("ftcs ethercat " + wire).c_str());
-  if (held == -EADDRINUSE) {
+  // Whoever holds it: two that move one drive are worse than none.
+  if (held == -EADDRINUSE || held == -EPERM) {
     return end_with(fmt::format("another ftcs ethercat uses {} already: stop it first", wire),
                     kRuntimeError);
   }
