@@ -15,6 +15,7 @@
  *     time = time_ns + rate d        half width = bound_ns + growth |d|
  */
 
+#include <errno.h>
 #include <fcntl.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -62,13 +63,19 @@ static inline const struct ftcs_time_page* ftcs_open_time(const char* path) {
   const int file = open(path, O_RDONLY | O_CLOEXEC);
   void* page = NULL;
   if (file < 0) return NULL;
+  /* What is shorter cannot be read: the reader would end by SIGBUS. */
+  if (lseek(file, 0, SEEK_END) < (off_t)sizeof(struct ftcs_time_page)) {
+    close(file);
+    errno = EINVAL;
+    return NULL;
+  }
   page = mmap(NULL, sizeof(struct ftcs_time_page), PROT_READ, MAP_SHARED, file, 0);
   close(file);
   return page == MAP_FAILED ? NULL : (const struct ftcs_time_page*)page;
 }
 
-/* The interval at a given reading of CLOCK_MONOTONIC_RAW. Never waits for the writer more than a
- * few tries. */
+/* The interval at a given reading of CLOCK_MONOTONIC_RAW, of now or of the last three seconds.
+ * Never waits for the writer more than a few tries. */
 static inline enum ftcs_time_state ftcs_time_at(const struct ftcs_time_page* page, int64_t raw_ns,
                                                 struct ftcs_time* result) {
   int tries = 0;
@@ -87,6 +94,8 @@ static inline enum ftcs_time_state ftcs_time_at(const struct ftcs_time_page* pag
     if ((before & 1u) != 0 || __atomic_load_n(&page->sequence, __ATOMIC_RELAXED) != before)
       continue;
     if (state == FTCS_UNKNOWN || !(half < 9e18)) return FTCS_UNKNOWN;
+    /* Written long after now: by a writer from before the machine was started again. */
+    if (passed < -fresh) return FTCS_UNKNOWN;
     result->time_ns = base + passed + (int64_t)extra;
     result->earliest_ns = result->time_ns - (int64_t)half - 2;
     result->latest_ns = result->time_ns + (int64_t)half + 2;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <sys/stat.h>
@@ -51,6 +52,19 @@ TEST_F(TimePageTest, tells_the_time_between_two_instants_and_how_far_it_has_grow
   EXPECT_EQ(now.latest_ns - now.earliest_ns, 2 * 502);
   page_.reset();
   EXPECT_EQ(ftcs_now(reader_, &now), FTCS_UNKNOWN) << "the writer has ended";
+}
+
+// A page on a disk, whose writer ended with the machine: CLOCK_MONOTONIC_RAW begins again.
+TEST_F(TimePageTest, a_page_from_before_a_restart_tells_nothing) {
+  ftcs_time now{};
+  page_->write({FTCS_LOCKED, 9'000'000'000'000, 5'000'000'000, 1.0, 100.0, 1e-7});
+  EXPECT_EQ(ftcs_time_at(reader_, 60'000'000'000, &now), FTCS_UNKNOWN);
+  EXPECT_EQ(ftcs_time_at(reader_, 8'999'000'000'000, &now), FTCS_LOCKED) << "a stamp of just now";
+}
+
+TEST_F(TimePageTest, a_file_that_is_no_page_yet_is_not_mapped) {
+  std::ofstream(folder_ + "/empty").close();
+  EXPECT_EQ(ftcs_open_time((folder_ + "/empty").c_str()), nullptr);
 }
 
 TEST_F(TimePageTest, a_reader_never_sees_half_of_a_write) {
