@@ -219,6 +219,7 @@ void for_each_case(const Visit& visit) {
   visit("ethercat_wire_alone", std::type_identity<EthercatWireCase>{});
   visit("ethercat_cycle_ftcs", std::type_identity<EthercatCycleCase<CycleLaw::kFtcs>>{});
   visit("ethercat_cycle_adaptive", std::type_identity<EthercatCycleCase<CycleLaw::kAdaptive>>{});
+  visit("ethercat_cycle_plant_time", std::type_identity<EthercatPlantTimeCase>{});
 }
 
 }  // namespace ftcs::bench

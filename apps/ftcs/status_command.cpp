@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "ftcs/daemon/ethercat/run_status.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/status_report.h"
 #include "ftcs/platform/stop_flag.h"
@@ -49,7 +50,11 @@ Result<Answer, std::string> ask(const std::string& path) {
 Result<Answer, std::string> ask_somebody(const std::string& given, const platform::StopFlag& stop) {
   if (!given.empty()) return ask(given);
   std::string tried;
-  for (const std::string& path : platform::usual_socket_paths(daemon::kSocketName)) {
+  std::vector<std::string> paths = platform::usual_socket_paths(daemon::kSocketName);
+  for (std::string& path : platform::usual_socket_paths(daemon::kEthercatSocketName)) {
+    paths.push_back(std::move(path));
+  }
+  for (const std::string& path : paths) {
     auto answer = ask(path);
     if (answer) return answer;
     if (stop.is_set()) break;
@@ -72,12 +77,13 @@ int run(const StatusArguments& arguments) {
 }  // namespace
 
 void add_status_command(CLI::App& app, int& exit_code) {
-  CLI::App* command =
-      app.add_subcommand("status", "what a running ftcs ptp does (over its socket)");
+  CLI::App* command = app.add_subcommand(
+      "status", "what a running ftcs ptp or ftcs ethercat does (over its socket)");
   const auto arguments = std::make_shared<StatusArguments>();
   command
       ->add_option("-s,--uds_address", arguments->socket,
-                   "the instance's socket; default: /var/run/ftcs or $XDG_RUNTIME_DIR/ftcs")
+                   "the instance's socket; default: /var/run/ftcs or $XDG_RUNTIME_DIR/ftcs, "
+                   "then the same with -ethercat")
       ->type_name("PATH");
   command->add_flag("--json", arguments->json, "the whole status as one JSON object");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

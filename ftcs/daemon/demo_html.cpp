@@ -3,6 +3,7 @@
 
 #include "ftcs/daemon/demo_report.h"
 #include "ftcs/daemon/ethercat/run_html.h"
+#include "ftcs/report/cycle_report.h"
 #include "ftcs/report/html_report.h"
 
 namespace ftcs::daemon {
@@ -59,6 +60,11 @@ std::string demo_html(const DemoOptions& options, const DemoResult* result,
     add_run_sections(report, ethercat->views());
     report.add_table("EtherCAT: what the drives saw in the last run",
                      drives_table(ethercat->segment->server()));
+    if (!ethercat->machines.rows.empty()) {
+      report.add_table("Two machines, one time (simulated)", two_machines_table(ethercat->machines),
+                       two_machines_method(ethercat->machines));
+      report.add_plot(two_machines_plot(ethercat->machines));
+    }
   }
   report.add_parameters({{"version", FTCS_VERSION},
                          {"duration of the PTP part", fmt::format("{:g} s", options.duration_s)},

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "ftcs/report/cycle_report.h"
 #include "ftcs/report/json.h"
 #include "ftcs/report/table.h"
 
@@ -79,7 +80,10 @@ std::string demo_json(const DemoOptions& options, const DemoResult* result,
   Json root;
   root["duration_s"] = options.duration_s;
   if (result != nullptr) add_ptp(root, options, *result);
-  if (ethercat != nullptr) root["ethercat"] = ethercat_demo_json(*ethercat);
+  if (ethercat != nullptr) {
+    root["ethercat"] = ethercat_demo_json(*ethercat);
+    root["two_machines"] = two_machines_json(ethercat->machines);
+  }
   return dump(root);
 }
 

@@ -209,7 +209,43 @@ void add_transmitter(Json& status, const ptp::TransmitterData* transmitter) {
   status["steps_removed"] = transmitter->announce.steps_removed + 1;
 }
 
+/// Of `ftcs ethercat run` (ethercat/run_status.h).
+std::string ethercat_text(const Json& status) {
+  std::string text;
+  const auto& drives = status.at("drives");
+  add_line(text, "segment",
+           fmt::format("{}, {} drives, {}", word(status, "interface"), drives.size(),
+                       is_true(status, "all_operational") ? "all in OP" : "not all in OP"));
+  add_line(
+      text, "cycle",
+      fmt::format("{}, servo {}, phase {:+.3f} us, rate {:+.3f} ppm, margin {:.1f} us",
+                  word(status, "state"), word(status, "servo"), figure(status, "phase_ns") * 1e-3,
+                  figure(status, "rate_ppb") * 1e-3, figure(status, "margin_ns") * 1e-3));
+  double furthest_ns = 0.0;
+  for (const Json& drive : drives) {
+    furthest_ns = std::max(furthest_ns, figure(drive, "system_time_difference_ns"));
+  }
+  add_line(
+      text, "frames",
+      fmt::format("working counter {:.0f} of {:.0f}, {:.0f} lost; |0x092C| {:.0f} ns at most",
+                  figure(status, "working_counter"), figure(status, "working_counter_expected"),
+                  figure(status, "lost_frames"), furthest_ns));
+  const Json& plant = status.at("plant_time");
+  if (!plant.is_object()) return text;
+  add_line(text, "plant time",
+           fmt::format("{}, {}, {}; dc to plant {:+.3f} us (sigma {:.3f} us), bent by {:+.3f} ppm",
+                       word(plant, "source"), word(plant, "mode"), word(plant, "state"),
+                       figure(plant, "dc_to_plant_ns") * 1e-3,
+                       figure(plant, "dc_to_plant_sigma_ns") * 1e-3,
+                       figure(plant, "bus_rate_ppb") * 1e-3));
+  return text;
+}
+
 std::string text_of(const Json& status) {
+  if (word(status, "role") == "ethercat" && status.contains("drives") &&
+      status.contains("plant_time")) {
+    return ethercat_text(status);
+  }
   std::string text;
   add_line(text, "port",
            fmt::format("{}, {}, {}", word(status, "interface"), word(status, "role"),

@@ -117,6 +117,9 @@ class TwoMachines {
     contour_squares_ += error * error;
     contour_worst_ = std::max(contour_worst_, std::abs(error));
     ++drawn_;
+    if (static_cast<double>(drawn_) * cycle_ns * 1e-9 <= world_.turn_s) {
+      circle_.push_back({std::atan2(y, x), error});
+    }
   }
   void summarise(TwoMachinesRun& result) {
     result.sync0_rms_ns = std::sqrt(squares_ / static_cast<double>(std::max(count_, 1)));
@@ -124,6 +127,7 @@ class TwoMachines {
     result.contour_rms_um = std::sqrt(contour_squares_ / static_cast<double>(std::max(drawn_, 1)));
     result.contour_worst_um = contour_worst_;
     result.told_rms_ns = std::sqrt(told_squares_ / static_cast<double>(std::max(drawn_, 1)));
+    result.circle = circle_;
     for (PlantMachine* machine : {&a_, &b_}) {
       result.faults += machine->faults();
       for (std::size_t n = 0; n < TwoMachinesWorld::kDrives; ++n) {
@@ -144,6 +148,7 @@ class TwoMachines {
   double contour_squares_ = 0.0;
   double contour_worst_ = 0.0;
   double told_squares_ = 0.0;
+  std::vector<CirclePoint> circle_;
   int count_ = 0;
   int drawn_ = 0;
 };
@@ -189,6 +194,9 @@ TwoMachinesRow row_of(MachineMode mode, const std::vector<TwoMachinesRun>& runs)
   take(row, runs, &TwoMachinesRun::contour_rms_um);
   take(row, runs, &TwoMachinesRun::contour_worst_um);
   take(row, runs, &TwoMachinesRun::told_rms_ns);
+  row.circle = runs.front().circle;
+  std::sort(row.circle.begin(), row.circle.end(),
+            [](const CirclePoint& a, const CirclePoint& b) { return a.angle_rad < b.angle_rad; });
   row.median.up = row.worst.up = true;
   for (const TwoMachinesRun& run : runs) {
     row.worst.up = row.worst.up && run.up;

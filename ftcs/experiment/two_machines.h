@@ -39,6 +39,12 @@ enum class MachineMode : std::uint8_t {
 };
 [[nodiscard]] const char* name(MachineMode mode) noexcept;
 
+/// Where the drawn circle is off the one that was asked for.
+struct CirclePoint {
+  double angle_rad = 0.0;
+  double error_um = 0.0;  ///< radial; positive: outside
+};
+
 /// True figures: SYNC0 of each drive of one machine against the same drive of the other.
 struct TwoMachinesRun {
   bool up = false;
@@ -49,6 +55,7 @@ struct TwoMachinesRun {
   std::uint64_t faults = 0;          ///< AL status codes that drives raised
   std::uint64_t missed_windows = 0;  ///< SYNC0 without new outputs, after OP
   double told_rms_ns = 0.0;          ///< error of dc_to_plant as the node tells it
+  std::vector<CirclePoint> circle;   ///< the first turn that was measured
 };
 
 struct TwoMachinesRow {
@@ -58,6 +65,7 @@ struct TwoMachinesRow {
   double demanded_rms_ns = 0.0;  ///< zero: nothing is demanded
   double demanded_worst_ns = 0.0;
   bool passed = false;
+  std::vector<CirclePoint> circle;  ///< of the first seed, by angle
 };
 
 struct TwoMachinesResult {

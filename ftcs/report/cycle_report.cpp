@@ -171,7 +171,6 @@ Table two_machines_table(const experiment::TwoMachinesResult& result) {
   return table;
 }
 
-namespace {
 std::string two_machines_method(const experiment::TwoMachinesResult& result) {
   const experiment::TwoMachinesWorld& world = result.world;
   return fmt::format(
@@ -190,6 +189,10 @@ std::string two_machines_method(const experiment::TwoMachinesResult& result) {
 Json two_machines_json(const experiment::TwoMachinesResult& result) {
   Json rows = Json::array();
   for (const experiment::TwoMachinesRow& row : result.rows) {
+    Json circle = Json::array();
+    for (const experiment::CirclePoint& point : row.circle) {
+      circle.push_back({number(point.angle_rad), number(point.error_um)});
+    }
     rows.push_back({{"mode", experiment::name(row.mode)},
                     {"seeds", result.seeds},
                     {"sync0_rms_ns", number(row.median.sync0_rms_ns)},
@@ -201,11 +204,30 @@ Json two_machines_json(const experiment::TwoMachinesResult& result) {
                     {"kalman_rms_ns", number(result.kalman_rms_ns)},
                     {"drive_faults", row.worst.faults},
                     {"missed_sync0_windows", row.worst.missed_windows},
+                    {"circle", std::move(circle)},
                     {"passed", row.passed}});
   }
   return rows;
 }
 
+Plot two_machines_plot(const experiment::TwoMachinesResult& result) {
+  Plot plot;
+  plot.title = "One circle whose axes stand on two machines: how far it is off";
+  plot.x_label = "angle / rad";
+  plot.y_label = "um";
+  for (const experiment::TwoMachinesRow& row : result.rows) {
+    PlotSeries series;
+    series.name = experiment::name(row.mode);
+    for (const experiment::CirclePoint& point : row.circle) {
+      series.x.push_back(point.angle_rad);
+      series.y.push_back(point.error_um);
+    }
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+namespace {
 std::string contour_console(const CycleResult& result) {
   std::string text;
   if (!result.contour.rows.empty()) {
@@ -283,6 +305,7 @@ std::string cycle_html(const CycleResult& result, const std::string& version) {
   if (!result.two_machines.rows.empty()) {
     report.add_table("Two machines, one time", two_machines_table(result.two_machines),
                      two_machines_method(result.two_machines));
+    report.add_plot(two_machines_plot(result.two_machines));
   }
   report.add_table("Choices", choices_table(result.choices));
   report.add_table("Checks", checks_table(result.checks));

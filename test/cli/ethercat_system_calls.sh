@@ -29,7 +29,10 @@ if [ $code -ne 0 ] && [ $code -ne 3 ] && [ $code -ne 1 ]; then
   exit 1
 fi
 # "PID name(...": names between the first and the last sleep. clock_gettime is a system call only where the kernel has no vDSO clock.
-awk '{ sub(/\(.*/, "", $2); names[NR] = $2; if ($2 == "clock_nanosleep") { if (!first) first = NR; last = NR } }
+# The thread that answers ftcs status, and that of a PTP receiver, have calls of their own.
+awk '{ sub(/\(.*/, "", $2) }
+     $2 == "clock_nanosleep" && !cycle { cycle = $1 }
+     $1 == cycle { names[++lines] = $2; if ($2 == "clock_nanosleep") { if (!first) first = lines; last = lines } }
      END { for (n = first; n <= last; ++n) count[names[n]]++; for (name in count) print name, count[name] }' "$folder/trace" |
   sort > "$folder/calls"
 cat "$folder/calls"

@@ -14,6 +14,7 @@
 #include "apps/ftcs/units.h"
 #include "ftcs/daemon/ethercat/cycle_laws.h"
 #include "ftcs/daemon/ethercat/ethercat_run.h"
+#include "ftcs/daemon/ethercat/run_status.h"
 #include "ftcs/daemon/exit_code.h"
 
 namespace ftcs::app {
@@ -141,6 +142,9 @@ int with_options(EthercatArguments arguments, Run run) {
     return kUsageError;
   }
   if (!can_write_results({arguments.options.json, arguments.options.html})) return kRuntimeError;
+  std::string& socket = arguments.options.status_socket;
+  arguments.options.status_socket_given = !socket.empty();
+  if (socket.empty()) socket = platform::writable_socket_path(daemon::kEthercatSocketName);
   if (const auto wrong = confine_to(rights_of(arguments.options), arguments.rights)) {
     fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
     return kRuntimeError;
@@ -291,6 +295,9 @@ void add_run_flags(CLI::App& command, daemon::RunOptions& options) {
       ->check(CLI::Range(0, 99));
   command.add_option("--cpu", options.cpu, "pin to this processor");
   command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+  command.add_option("--uds_address", options.status_socket,
+                     "where ftcs status asks; default /var/run/ftcs-ethercat or "
+                     "$XDG_RUNTIME_DIR/ftcs-ethercat");
   command.add_flag("-q,--quiet", options.quiet, "no live lines");
   command.add_option("--json", options.json, "write the figures to this file");
   command.add_option("--csv", options.csv, "write each cycle to this file");

@@ -7,6 +7,7 @@
 #include "ftcs/daemon/ethercat/run_html.h"
 #include "ftcs/daemon/ethercat/run_report.h"
 #include "ftcs/platform/stop_flag.h"
+#include "ftcs/report/cycle_report.h"
 
 namespace ftcs::daemon {
 
@@ -24,6 +25,14 @@ constexpr Nanoseconds kGate{500'000};
 constexpr std::uint32_t kLostFrames = 250;
 /// Some hundreds let the clocks converge; the rest happens while the cycle runs.
 constexpr std::uint32_t kDriftPulses = 3000;
+
+/// Two machines, as `ftcs paper --section 5` has them, for some seconds of processor time.
+experiment::TwoMachinesWorld brief_world() {
+  experiment::TwoMachinesWorld world;
+  world.settling_s = 20.0;
+  world.measured_s = 2.0;
+  return world;
+}
 
 RunOptions run_options(const EthercatDemoOptions& demo, std::uint16_t port) {
   RunOptions options;
@@ -82,6 +91,7 @@ std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& optio
   }
   platform::leave_realtime();
   demo->segment->stop();
+  if (!stop()) demo->machines = experiment::run_two_machines_table(brief_world(), 1, {});
   return demo;
 }
 
@@ -101,7 +111,11 @@ std::string ethercat_demo_text(const EthercatDemo& demo) {
          runs_table(demo.views()).to_text() +
          "PICS with gains (1, 1) is deadbeat and equals FTCS with p = 1; it has to know its "
          "interval. soem-pi: SOEM's\npublished PI law, which takes the frame's time for the "
-         "cycle's.\n";
+         "cycle's.\n" +
+         (demo.machines.rows.empty() ? ""
+                                     : "\nTwo machines, one time (simulated)\n\n" +
+                                           two_machines_table(demo.machines).to_text() +
+                                           two_machines_method(demo.machines) + "\n");
 }
 
 Json ethercat_demo_json(const EthercatDemo& demo) {

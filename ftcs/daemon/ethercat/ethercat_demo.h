@@ -6,6 +6,7 @@
 
 #include "ftcs/daemon/ethercat/local_segment.h"
 #include "ftcs/daemon/ethercat/main_runner.h"
+#include "ftcs/experiment/two_machines.h"
 #include "ftcs/report/json.h"
 
 namespace ftcs::daemon {
@@ -21,6 +22,7 @@ struct EthercatDemo {
   std::unique_ptr<LocalSegment> segment;
   std::vector<std::unique_ptr<MainRunner>> runs;  ///< FTCS first
   platform::RealtimeSetup setup;
+  experiment::TwoMachinesResult machines;  ///< in simulated time; no rows: interrupted
 
   [[nodiscard]] std::vector<const MainRunner*> views() const;
 };

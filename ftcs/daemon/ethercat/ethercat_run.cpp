@@ -117,10 +117,23 @@ std::optional<std::string> drive_that_is_not_there(const RunOptions& options, st
   return std::nullopt;
 }
 
+/// Null: nobody can ask. Another run, on another wire, may have the usual place.
+Result<std::unique_ptr<RunStatus>, std::string> open_status(const RunOptions& options) {
+  if (options.status_socket.empty()) return std::unique_ptr<RunStatus>{};
+  auto status = RunStatus::open(options);
+  if (status) return std::move(*status);
+  if (options.status_socket_given) return status.error().message();
+  if (!options.quiet) fmt::print("no status socket: {}\n", status.error().message());
+  return std::unique_ptr<RunStatus>{};
+}
+
 int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const RunOptions& options = runner.options();
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
   if (const auto unknown = runner.await_plant_time(stop)) return end_with(*unknown, kNotLocked);
+  const auto status = open_status(options);
+  if (!status) return end_with(status.error(), kRuntimeError);
+  if (*status) runner.tell(**status);
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);

@@ -166,6 +166,9 @@ void MainRunner::cycle() {
   if (HostClock::now() >= next_line_) {
     next_line_ = next_line_ + Duration{kLineInterval};
     link_.refresh_clock();
+    if (status_ != nullptr) {
+      status_->publish(RunSnapshot::of(*node_, figures().margin.quantile(0.5)));
+    }
     if (!options_.quiet) print_live();
   }
 }

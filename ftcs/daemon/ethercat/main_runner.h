@@ -11,6 +11,7 @@
 #include "ftcs/daemon/ethercat/cycle_csv.h"
 #include "ftcs/daemon/ethercat/plant_clock.h"
 #include "ftcs/daemon/ethercat/run_options.h"
+#include "ftcs/daemon/ethercat/run_status.h"
 #include "ftcs/daemon/service_report.h"
 #include "ftcs/experiment/cycle_figures.h"
 #include "ftcs/node/cycle_node.h"
@@ -31,6 +32,8 @@ class MainRunner {
   }
   /// The clock of --plant-time; before bring_up().
   void set_plant_clock(PlantClock clock) { plant_.emplace(std::move(clock)); }
+  /// Who is told once a second how it goes; must outlive the run.
+  void tell(RunStatus& status) { status_ = &status; }
   /// The drives are put onto plant time before the first cycle: waits until it is known. One
   /// sentence if it is not within --await-lock (zero: half a minute), or `stop` came first.
   [[nodiscard]] std::optional<std::string> await_plant_time(const std::function<bool()>& stop);
@@ -68,6 +71,7 @@ class MainRunner {
   FreeRunningTime next_line_;
   CycleCsv csv_;
   std::optional<PlantClock> plant_;
+  RunStatus* status_ = nullptr;
   ServiceReport service_;
   std::array<char, 160> sentence_{};  ///< the cyclic path touches no heap
 };

@@ -57,6 +57,9 @@ struct RunOptions {
   bool contour = false;  ///< drives are the modelled ones: watch the circle of the first two
   bool quiet = false;
   bool trace = true;  ///< keep a point for each of the first half million cycles: histograms, plots
+  /// Who asks there with `ftcs status` is answered; empty: nobody is.
+  std::string status_socket;
+  bool status_socket_given = false;  ///< named by the user: it must be had
   std::string json;
   std::string csv;
   std::string html;

@@ -125,11 +125,6 @@ void print_clocks(const MainRunner& runner) {
   }
 }
 
-const char* name(node::BusMode mode) {
-  if (mode == node::BusMode::kLead) return "lead";
-  return mode == node::BusMode::kExternal ? "external" : "follow";
-}
-
 Json bus_json(const MainRunner& runner) {
   const BusClockDecision& bus = runner.bus();
   return {{"mode", name(runner.options().bus_mode)},
@@ -146,6 +141,11 @@ std::string describe(const ethercat::Identity& identity) {
 }
 
 }  // namespace
+
+const char* name(node::BusMode mode) {
+  if (mode == node::BusMode::kLead) return "lead";
+  return mode == node::BusMode::kExternal ? "external" : "follow";
+}
 
 const char* name(CycleState state) {
   switch (state) {

@@ -9,6 +9,7 @@
 namespace ftcs::daemon {
 
 [[nodiscard]] const char* name(CycleState state);
+[[nodiscard]] const char* name(node::BusMode mode);
 [[nodiscard]] const char* name(node::CycleNote::Kind kind);
 void print_scan(const ethercat::MainDevice& main);
 /// One or two lines for the user: what failed, where, and what was expected.
