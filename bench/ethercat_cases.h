@@ -172,13 +172,14 @@ class EthercatPlantTimeCase : EthercatCycleCase<CycleLaw::kAdaptive> {
     static_cast<void>(EthercatCycleCase::step());
     BusClockSample sample;
     sample.has_dc = sample.usable = main_->last_cycle().has_reference;
-    sample.dc = LocalTime{main_->last_cycle().reference.since_epoch()};
+    // The echo hears of no offset; the bus obeys here.
+    sample.dc =
+        LocalTime{main_->last_cycle().reference.since_epoch()} + Duration::from_whole_ns(in_force_);
     sample.plant = ReferenceTime{now_.since_epoch()};
     sample.offset_ns = in_force_;
     in_force_ = bus_.decision().offset_ns;
     const std::int64_t wanted = bus_.update(sample).offset_ns;
     main_->shift_system_time(wanted - in_force_);
-    // The echo does not hear of the offset: for the estimator it is a bus that does not obey.
     return wanted;
   }
   [[nodiscard]] bool valid() const noexcept {
