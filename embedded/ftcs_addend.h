@@ -31,7 +31,7 @@ extern "C" {
 enum ftcs_addend_verdict {
   FTCS_ADDEND_USED = 0,
   FTCS_ADDEND_DUPLICATE = 1,   /* newer than its predecessor on neither clock */
-  FTCS_ADDEND_IMPLAUSIBLE = 2, /* one of the clocks jumped: starts again from this sample */
+  FTCS_ADDEND_IMPLAUSIBLE = 2, /* a clock jumped, or 37 minutes went by: starts again from here */
   FTCS_ADDEND_STALE = 3,   /* stamped before the last command was written: says nothing about it */
   FTCS_ADDEND_REJECTED = 4 /* quiet mode: unlike its neighbours; the second in a row is believed */
 };
@@ -52,12 +52,13 @@ enum ftcs_addend_error {
   FTCS_ADDEND_BAD_GAIN = 3,  /* above 65536 */
   FTCS_ADDEND_BAD_BAND =
       4, /* band_leave_ns below band_enter_ns, or lock_leave_ns below lock_enter_ns */
-  FTCS_ADDEND_BAD_TIME = 5,   /* negative, above an hour, or T_c longer than a given T */
+  FTCS_ADDEND_BAD_TIME = 5,   /* negative, above an hour (step_ns: 2^28 ns), or T_c longer than T */
   FTCS_ADDEND_BAD_MEMORY = 6, /* a filter with a quiet_memory below 8 or above 255 */
   FTCS_ADDEND_BAD_ADDEND = 7  /* addend_now outside nominal (1 +- F) */
 };
 
-#define FTCS_ADDEND_UNBOUNDED UINT32_MAX /* as band: every offset lies inside */
+/* As band: every offset lies inside. So does it where a threshold is above 2^28 ns (0.27 s). */
+#define FTCS_ADDEND_UNBOUNDED UINT32_MAX
 
 struct ftcs_addend_servo;
 

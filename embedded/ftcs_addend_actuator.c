@@ -74,13 +74,14 @@ void ftcs_addend_wrote(ftcs_addend_servo* servo, int64_t at_ns, uint32_t addend,
                                            -(planned >> 1), FTCS_LONGEST_LATENCY);
     int64_t before = servo->before_start + late;
     /* The clock went on as it had from the sample to start_ns, near enough. */
-    if (planned > 0)
+    if (planned > 0) {
       before += ftcs_addend_times(late, ftcs_addend_divide(servo->before_start - planned, planned));
+    }
     servo->addend = limited(servo, next_addend);
     servo->fraction = (int32_t)ftcs_addend_clamp(
         servo->fraction + ((int64_t)was - (int64_t)servo->addend) * 65536, -INT32_MAX, INT32_MAX);
-    servo->before_start =
-        before + ftcs_addend_times(before, ftcs_addend_change(servo->addend, was));
+    before += ftcs_addend_times(before, ftcs_addend_change(servo->addend, was));
+    servo->before_start = ftcs_addend_clamp(before, -FTCS_LONGEST, FTCS_LONGEST);
     ftcs_addend_plan(servo, ftcs_addend_sum(servo->start_ns, late >> 16),
                      servo->length > late ? servo->length - late : 0, limited(servo, addend));
   }

@@ -260,6 +260,7 @@ TEST(AddendServo, refuses_each_configuration_that_it_cannot_keep) {
   EXPECT_EQ(error([](auto& c) { c.band_leave_ns = 1; }), FTCS_ADDEND_BAD_BAND);
   EXPECT_EQ(error([](auto& c) { c.lock_leave_ns = 1; }), FTCS_ADDEND_BAD_BAND);
   EXPECT_EQ(error([](auto& c) { c.interval_ns = -1; }), FTCS_ADDEND_BAD_TIME);
+  EXPECT_EQ(error([](auto& c) { c.step_ns = 1U << 28U; }), FTCS_ADDEND_BAD_TIME);
   EXPECT_EQ(error([](auto& c) { c.interval_ns = 10, c.correction_ns = 11; }), FTCS_ADDEND_BAD_TIME);
   EXPECT_EQ(error([](auto& c) { c = quiet(), c.quiet_memory = 7; }), FTCS_ADDEND_BAD_MEMORY);
   EXPECT_EQ(error([](auto& c) { c = quiet(), c.quiet_memory = 256; }), FTCS_ADDEND_BAD_MEMORY);
@@ -322,7 +323,7 @@ TEST(AddendServo, keeps_every_addend_within_its_limits_whatever_it_is_fed) {
       ASSERT_LE(command.addend, node.servo.fastest);
       ASSERT_GE(command.next_addend, node.servo.slowest);
       ASSERT_LE(command.next_addend, node.servo.fastest);
-      if (random() % 4 == 0)
+      for (std::uint64_t again = random() % 8; again < 5; ++again)
         ftcs_addend_wrote(&node.servo, any(), static_cast<std::uint32_t>(any()),
                           static_cast<std::uint32_t>(any()));
       if (random() % 4 == 0) ftcs_addend_wrote_next(&node.servo, any());
