@@ -100,8 +100,7 @@ class EthercatCycleCase {
     }
   }
   void finish(std::size_t size) noexcept {
-    const LocalTime sent{now_.since_epoch()};
-    static_cast<void>(main_->on_frame(bytes(size), {sent, sent}));
+    static_cast<void>(main_->on_frame(bytes(size), {now_, now_}));
     CycleSample sample;
     sample.sent = now_;
     sample.has_reference = main_->last_cycle().has_reference;

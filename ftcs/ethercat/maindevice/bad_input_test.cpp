@@ -48,6 +48,21 @@ TEST_F(BadInput, a_wire_that_only_reflects_has_no_subdevices) {
   EXPECT_EQ(main.failure().kind, FailureKind::kNoSubDevices);
 }
 
+TEST_F(BadInput, plant_time_does_not_fit_a_reference_clock_of_32_bits) {
+  bench_.plant_time = true;
+  bench_.tamper = [](const FrameView& frame) {
+    for (const Datagram datagram : frame) {
+      const std::size_t at = datagram.offset();
+      const bool read = datagram.command() == Command::kFprd;
+      if (!read || at > reg::kFeatures || at + datagram.data().size() <= reg::kFeatures) continue;
+      datagram.data()[reg::kFeatures - at] &= static_cast<std::uint8_t>(~reg::kFeatureDc64);
+    }
+  };
+  EXPECT_EQ(bring_up().kind, FailureKind::kNarrowClock);
+  EXPECT_EQ(bring_up().position, 0U);
+  EXPECT_NE(std::string(name(bring_up().kind)).find("32 bits"), std::string::npos);
+}
+
 TEST_F(BadInput, more_subdevices_than_there_is_memory_for) {
   change(reg::kType, [](const Datagram& datagram) {
     if (datagram.command() == Command::kBrd) set_counter(datagram, kMaxSubDevices + 1);

@@ -41,7 +41,9 @@ class MainBench : public WireBench {
     }
     if (tamper) tamper(*view);
     if (capture) capture(now_of_master(), ConstBytes{buffer}.first(frame.size()));
-    const FrameStamps stamps{now_of_master(), relabel<FreeRunningTime>(passage.at)};
+    FrameStamps stamps{now_of_master(), relabel<FreeRunningTime>(passage.at)};
+    stamps.has_system_time = plant_time;
+    stamps.system_time = relabel<ReferenceTime>(stamps.sent);
     main_->on_frame(Bytes{buffer}.first(frame.size()), stamps);
     return true;
   }
@@ -61,6 +63,7 @@ class MainBench : public WireBench {
   }
   [[nodiscard]] FreeRunningTime now_of_master() const { return relabel<FreeRunningTime>(now()); }
 
+  bool plant_time = false;  ///< the drives are to be put onto it
   std::function<bool(std::size_t)> lose;
   std::function<void(FreeRunningTime, ConstBytes)> capture;
   std::function<void(const FrameView&)> tamper;  ///< changes what comes back
