@@ -151,6 +151,10 @@ judge_stated() {  # NAME A-B [share=PERCENT] [from=S]
   fi
 }
 
+sd_of() {
+  sed -n 's/.* sd=\([0-9.]*\).*/\1/p' "$1.judged"
+}
+
 rms_of() {
   sed -n 's/.* rms=\([0-9.]*\).*/\1/p' "$1.judged"
 }
