@@ -248,7 +248,7 @@ TEST_F(Node, a_better_transmitter_that_is_seconds_off_is_doubted_and_the_other_f
   announce(kB, now + 100ms, 1);
   ASSERT_EQ(node->port().transmitter()->port, kB);
   start = now + 1ms;
-  for (int i = 0; i < 6 && node->port().transmitter()->port == kB; ++i) {
+  for (int i = 0; i < 20 && node->port().transmitter()->port == kB; ++i) {
     start += kInterval;
     at(start + kDelay);
     node->on_event_message(bytes_of(sync_from(kB, sequence)).view(), local(now), local(now));

@@ -23,12 +23,15 @@ inline constexpr Nanoseconds kJumpTolerance{500'000'000};
 /// one that was believed, the time does not count for which it has been contradicted. A new time is
 /// believed with its kAgreeing-th Sync in a row or a later one, over at least kLeastSpan and the
 /// usual gap between two Syncs: that gap alone is what anybody can make short by adding Syncs that
-/// agree. A true transmitter that was set is followed a second later; who can only add messages to
-/// those of one that sends a Sync a second or more never is.
+/// agree. They must also be half as many as usually come in that time: who has put the true Syncs
+/// out of order sends fewer; or nobody has contradicted them for kLongestSpan. A true transmitter
+/// that was set is followed a second later; who can only add messages to those of one that sends a
+/// Sync a second or more never is.
 class ReferenceWatch {
  public:
   static constexpr int kAgreeing = 3;
   static constexpr Nanoseconds kLeastSpan{1'000'000'000};
+  static constexpr Nanoseconds kLongestSpan{8'000'000'000};
 
   enum class Verdict : std::uint8_t { kGoesOn, kDoubted, kJumped };
   struct Finding {
@@ -46,7 +49,8 @@ class ReferenceWatch {
     ++agreeing_;
     const Duration span = pair.free_running - first_.free_running;
     const Duration gap = usual_gap_ > Duration{} ? usual_gap_ : between(*last_, first_);
-    if (agreeing_ < kAgreeing || span < std::max(gap, Duration{kLeastSpan})) {
+    const bool dense = 2.0 * agreeing_ * gap.ns() >= span.ns() || span >= Duration{kLongestSpan};
+    if (agreeing_ < kAgreeing || span < std::max(gap, Duration{kLeastSpan}) || !dense) {
       return {Verdict::kDoubted, {}};
     }
     const Duration jump = jump_between(*last_, pair);

@@ -275,10 +275,11 @@ void TimeReceiver::follow_jump(Duration jump, FreeRunningTime now, ActionList& a
   if (has_transmitter_) port_.push(ReferenceJumped{jump}, actions);
 }
 
+// What the reference showed is remembered: another transmitter that tells another time, or the first
+// message after a change, is believed as any jump is.
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
   delay_requests_.stop(port_.counters());
-  reference_.reset();
   has_information_ = false;
   new_time_base_told_ = 0;
   peer_delay_.set_reference_rate(Rate{});
