@@ -275,8 +275,8 @@ void TimeReceiver::follow_jump(Duration jump, FreeRunningTime now, ActionList& a
   if (has_transmitter_) port_.push(ReferenceJumped{jump}, actions);
 }
 
-// What the reference showed is remembered: another transmitter that tells another time, or the first
-// message after a change, is believed as any jump is.
+// What the reference showed is remembered: another transmitter that tells another time, or the
+// first message after a change, is believed as any jump is.
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
   delay_requests_.stop(port_.counters());
