@@ -113,7 +113,7 @@ end_follow() {
 }
 
 # What happened, as one line of the report; the table is made of these. A limit that does not hold is a failure. What ours stated of its own error
-# is judged with it: 99 of 100 within three times the deviation, from 5 s on, or $STATED_FROM.
+# is judged with it: 99 of 100 within three times the deviation, from 5 s on, or $STATED_FROM and $STATED_SHARE.
 judge() {  # NAME A-B [limit=V ...]
   local answer
   if answer=$(witness judge "$1.truth" "${@:2}" 2>&1); then
@@ -125,7 +125,7 @@ judge() {  # NAME A-B [limit=V ...]
   if [ -s "$1.stated" ] && [ -z "$UNSEEN" ] && [ ! -e "$1.stated.judged" ]; then
     touch "$1.stated.judged"
     # shellcheck disable=SC2046
-    judge_stated "$1" "$2" "from=${STATED_FROM:-5}" $(printf '%s\n' "${@:3}" | grep "^target=")
+    judge_stated "$1" "$2" "from=${STATED_FROM:-5}" "share=${STATED_SHARE:-99}" $(printf '%s\n' "${@:3}" | grep "^target=")
   fi
 }
 
@@ -148,6 +148,15 @@ judge_stated() {  # NAME A-B [share=PERCENT] [from=S]
     echo "ok      $1:$answer"
   else
     fail "$1:$answer"
+  fi
+}
+
+goal_stated() {  # as judge_stated
+  local answer
+  if answer=$(witness sigma "$1.stated" "${@:2}" 2>&1); then
+    echo "ok      $1:$answer"
+  else
+    echo "MISSED  $1:$answer"
   fi
 }
 

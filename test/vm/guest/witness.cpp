@@ -267,7 +267,8 @@ int sigma(const Arguments& arguments) {
     throw std::runtime_error(arguments[0] + ": no offset_sigma_ns was stated");
   const double outside = 100.0 * (count - within) / count;
   std::printf(" stated=%d beyond_3_sigma=%.1f%%\n", count, outside);
-  return outside <= 100 - question.get("share", 99) ? 0 : 1;
+  // One of fewer than a hundred tells nothing.
+  return count - within <= 1 || outside <= 100 - question.get("share", 99) ? 0 : 1;
 }
 
 int run(const std::string& command, const Arguments& arguments) {
