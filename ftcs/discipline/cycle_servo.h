@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <variant>
+
 #include "ftcs/clock/cycle_timer.h"
 #include "ftcs/clock/steering_history.h"
 #include "ftcs/discipline/cycle_servo_types.h"
@@ -13,6 +15,49 @@ struct NoAdaptiveServo {
   ServoUpdate update(const TimestampPair&, const ClockReading&) noexcept { return {}; }
   void reset() noexcept {}
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return {}; }
+};
+
+/// What one frame told of the phase: the reference showed so much when the steered clock did.
+struct CyclePhase {
+  ReferenceTime reference;
+  LocalTime local;
+  FreeRunningTime stamp;  ///< of both
+};
+
+/// What the cycle has to know of its law.
+struct CycleLawTraits {
+  bool once_per_sync = false;  ///< takes one good sample an interval
+  bool every_cycle = false;    ///< takes each, and weighs it itself
+  /// After so many commands it knows the rate.
+  std::uint32_t commands_to_rate = 0;
+};
+
+/// The laws of a cycle: alternatives of one variant.
+struct FreeCycleLaw {
+  static constexpr CycleLawTraits kTraits{};
+  ServoUpdate update(const CyclePhase&, const ClockReading&) noexcept { return {}; }
+  void reset() noexcept {}
+};
+template <class Servo, std::uint32_t commands_to_rate>
+struct SampledCycleLaw {
+  template <class Config>
+  explicit SampledCycleLaw(const Config& config) noexcept : servo(config) {}
+  static constexpr CycleLawTraits kTraits{true, false, commands_to_rate};
+  ServoUpdate update(const CyclePhase& phase, const ClockReading& now) noexcept {
+    return servo.update(SyncSample{phase.reference, Duration{}, phase.local, phase.stamp}, now);
+  }
+  void reset() noexcept { servo.reset(); }
+  Servo servo;
+};
+template <class Servo>
+struct MessageCycleLaw {
+  explicit MessageCycleLaw(const AdaptiveConfig& config) noexcept : servo(config) {}
+  static constexpr CycleLawTraits kTraits{false, true, 2};
+  ServoUpdate update(const CyclePhase& phase, const ClockReading& now) noexcept {
+    return servo.update({Direction::kBackward, phase.reference, phase.local, phase.stamp}, now);
+  }
+  void reset() noexcept { servo.reset(); }
+  Servo servo;
 };
 
 /// Keeps a cyclic task in phase with a reference clock that only its own frames can read: Section V
@@ -52,6 +97,7 @@ class BasicCycleServo {
   void follow(const CycleSample& sample, FreeRunningTime stamp, FreeRunningTime now) noexcept;
   [[nodiscard]] bool doubtful(Duration error) noexcept;
   [[nodiscard]] bool sample_due() const noexcept;
+  [[nodiscard]] CycleLawTraits traits() const noexcept;
   [[nodiscard]] ServoUpdate ask_law(const CycleSample& sample, FreeRunningTime stamp,
                                     LocalTime local, FreeRunningTime now) noexcept;
   void apply(const ServoCommand& command, FreeRunningTime now) noexcept;
@@ -62,9 +108,10 @@ class BasicCycleServo {
   [[nodiscard]] CycleDecision decide(FreeRunningTime now) noexcept;
 
   CycleServoConfig config_;
-  FtcsServo ftcs_;
-  PicsServo pics_;
-  Adaptive adaptive_;
+  /// FTCS knows the rate with its first command, the others learn it from the second on.
+  using Law = std::variant<FreeCycleLaw, SampledCycleLaw<FtcsServo, 1>,
+                           SampledCycleLaw<PicsServo, 2>, MessageCycleLaw<Adaptive>>;
+  Law law_;
   SteeringHistory history_;
   CycleTimer timer_;
   LockDetector lock_;

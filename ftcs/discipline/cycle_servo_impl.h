@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ftcs/discipline/cycle_servo.h"
+#include "ftcs/time/visit.h"
 
 namespace ftcs {
 namespace cycle_servo_detail {
@@ -52,13 +53,31 @@ inline constexpr std::uint32_t kOutOfPhaseForResync = 3;
 template <class Adaptive>
 BasicCycleServo<Adaptive>::BasicCycleServo(const CycleServoConfig& config) noexcept
     : config_(config),
-      ftcs_(cycle_servo_detail::ftcs_config(config)),
-      pics_(cycle_servo_detail::pics_config(config)),
-      adaptive_(cycle_servo_detail::adaptive_config(config)),
       history_(SteeringHistory::Map{}),
       timer_({.first = LocalTime{}, .cycle_time = config.cycle, .resolution = config.resolution}),
       lock_(config.lock),
-      gate_(config.outliers) {}
+      gate_(config.outliers) {
+  // In its place: the adaptive one is too large for a stack.
+  using namespace cycle_servo_detail;
+  switch (config.law) {
+    case CycleLaw::kNone:
+      break;
+    case CycleLaw::kFtcs:
+      law_.template emplace<SampledCycleLaw<FtcsServo, 1>>(ftcs_config(config));
+      break;
+    case CycleLaw::kPics:
+      law_.template emplace<SampledCycleLaw<PicsServo, 2>>(pics_config(config));
+      break;
+    case CycleLaw::kAdaptive:
+      law_.template emplace<MessageCycleLaw<Adaptive>>(adaptive_config(config));
+      break;
+  }
+}
+
+template <class Adaptive>
+CycleLawTraits BasicCycleServo<Adaptive>::traits() const noexcept {
+  return ftcs::visit([](const auto& law) { return law.kTraits; }, law_);
+}
 
 template <class Adaptive>
 CycleDecision BasicCycleServo<Adaptive>::start(FreeRunningTime now) noexcept {
@@ -74,9 +93,7 @@ CycleDecision BasicCycleServo<Adaptive>::start(FreeRunningTime now) noexcept {
 
 template <class Adaptive>
 void BasicCycleServo<Adaptive>::restart_law() noexcept {
-  ftcs_.reset();
-  pics_.reset();
-  adaptive_.reset();
+  ftcs::visit([](auto& law) { law.reset(); }, law_);
   commands_ = 0;
   until_sync_ = 0;
   out_of_phase_ = 0;
@@ -84,11 +101,9 @@ void BasicCycleServo<Adaptive>::restart_law() noexcept {
 }
 
 /// In phase by the start's jump alone is no lock: the first interval still drifts away from it.
-/// FTCS knows the rate with its first command, the others learn it from the second on.
 template <class Adaptive>
 bool BasicCycleServo<Adaptive>::rate_known() const noexcept {
-  if (config_.law == CycleLaw::kNone) return true;
-  return commands_ >= (config_.law == CycleLaw::kFtcs ? 1U : 2U);
+  return commands_ >= traits().commands_to_rate;
 }
 
 template <class Adaptive>
@@ -205,8 +220,7 @@ void BasicCycleServo<Adaptive>::follow(const CycleSample& sample, FreeRunningTim
   const bool doubted = doubtful(error);
   if (doubted) decision_.verdict = CycleVerdict::kDoubtful;
   if (rate_known() && !doubted) lock_.update(error);
-  // The adaptive servo weighs each sample itself.
-  if (doubted && config_.law != CycleLaw::kAdaptive) return;
+  if (doubted && !traits().every_cycle) return;
   const ServoUpdate update = ask_law(sample, stamp, local, now);
   if (update.has_command) apply(update.command, now);
 }
@@ -226,23 +240,17 @@ bool BasicCycleServo<Adaptive>::doubtful(Duration error) noexcept {
 /// FTCS and PICS act on this cycle, if it has a good sample.
 template <class Adaptive>
 bool BasicCycleServo<Adaptive>::sample_due() const noexcept {
-  const bool samples = config_.law == CycleLaw::kFtcs || config_.law == CycleLaw::kPics;
-  return samples && until_sync_ == 0;
+  return traits().once_per_sync && until_sync_ == 0;
 }
 
 template <class Adaptive>
 ServoUpdate BasicCycleServo<Adaptive>::ask_law(const CycleSample& sample, FreeRunningTime stamp,
                                                LocalTime local, FreeRunningTime now) noexcept {
-  const bool adaptive = config_.law == CycleLaw::kAdaptive;
-  if (!adaptive && !sample_due()) return {};
-  const ReferenceTime reference = sample.reference - Duration{config_.transit};
+  if (!traits().every_cycle && !sample_due()) return {};
+  if (traits().once_per_sync) until_sync_ = config_.cycles_per_sync;
+  const CyclePhase phase{sample.reference - Duration{config_.transit}, local, stamp};
   const ClockReading reading{now, history_.local_at(now)};
-  if (adaptive) {
-    return adaptive_.update({Direction::kBackward, reference, local, stamp}, reading);
-  }
-  until_sync_ = config_.cycles_per_sync;
-  const SyncSample sync{reference, Duration{}, local, stamp};
-  return config_.law == CycleLaw::kFtcs ? ftcs_.update(sync, reading) : pics_.update(sync, reading);
+  return ftcs::visit([&](auto& law) { return law.update(phase, reading); }, law_);
 }
 
 template <class Adaptive>
