@@ -50,6 +50,7 @@ struct PtpArguments {
   std::vector<std::string> acceptable;
   bool no_fast_start = false;
   std::optional<double> duration_s;
+  daemon::WatchOptions watch{};
 };
 
 /// The flags of `ftcs ptp`: ptp4l's, our own, and every setting of ptp4l's configuration file.

@@ -11,6 +11,7 @@
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_presets.h"
 #include "apps/ftcs/units.h"
+#include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/ptp_port.h"
 #include "ftcs/platform/network_interface.h"
@@ -198,6 +199,10 @@ Wrong apply_role(const PtpArguments& arguments, daemon::PtpOptions& options) {
   }
   if (arguments.hardware) options.timestamps = platform::TimestampMode::kHardware;
   if (arguments.software) options.timestamps = platform::TimestampMode::kSoftware;
+  options.watch = arguments.watch;
+  if (options.watch.is_wanted() && options.role == daemon::Role::kTimeTransmitter) {
+    return "--web and --metrics: a time transmitter follows nobody, there is nothing to show";
+  }
   if (arguments.json) options.output = daemon::Output::kJson;
   if (arguments.csv) options.output = daemon::Output::kCsv;
   if (arguments.duration_s) options.duration = Duration::from_ns(*arguments.duration_s * 1e9);
@@ -229,6 +234,7 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
       app.add_subcommand("ptp", "follow a PTP time transmitter, or be one (flags as ptp4l's)");
   const auto arguments = std::make_shared<PtpArguments>();
   add_ptp_arguments(*command, *arguments);
+  add_watch_flags(*command, arguments->watch);
   command->callback([arguments, &exit_code] {
     daemon::PtpOptions options;
     if (const auto wrong = make_ptp_options(*arguments, options)) {

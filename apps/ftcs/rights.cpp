@@ -32,6 +32,21 @@ void use_network(Confinement& rights, const daemon::PtpOptions& options) {
   }
 }
 
+/// Metrics and the live page: a web server in threads of its own.
+void be_watched(Confinement& rights, const daemon::WatchOptions& options) {
+  if (!options.is_wanted()) return;
+  for (const SystemCalls kind :
+       {SystemCalls::kNetwork, SystemCalls::kThreads, SystemCalls::kServer}) {
+    rights.calls.push_back(kind);
+  }
+  for (const auto& address : {options.web, options.metrics}) {
+    if (address && address->port != 0 && address->port < kFirstFreePort) {
+      rights.capabilities.push_back(CAP_NET_BIND_SERVICE);
+    }
+  }
+  write_files(rights, !options.metrics_file.empty());
+}
+
 }  // namespace
 
 Confinement rights_of(const daemon::PtpOptions& options) {
@@ -48,6 +63,7 @@ Confinement rights_of(const daemon::PtpOptions& options) {
   if (!options.driftfile.empty()) rights.calls.push_back(SystemCalls::kThreads);
   write_files(rights, !options.driftfile.empty() || !options.chrony_socket.empty() ||
                           !options.time_page.empty());
+  be_watched(rights, options.watch);
   return rights;
 }
 
@@ -56,6 +72,7 @@ Confinement rights_of(const daemon::PhcOptions& options) {
   rights.calls = {SystemCalls::kFiles, SystemCalls::kNetwork, SystemCalls::kSteering};
   rights.capabilities = {CAP_SYS_TIME};
   if (options.automatic || options.wait_for_port) rights.capabilities.push_back(CAP_CHOWN);
+  be_watched(rights, options.watch);
   return rights;
 }
 
@@ -70,6 +87,7 @@ Confinement rights_of(const daemon::RunOptions& options) {
     use_network(rights, options.ptp);
   }
   write_files(rights, !options.json.empty() || !options.csv.empty() || !options.html.empty());
+  be_watched(rights, options.watch);
   return rights;
 }
 

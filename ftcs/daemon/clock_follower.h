@@ -32,6 +32,7 @@ class ClockFollower {
 
   [[nodiscard]] bool locked() const { return node_.locked(); }
   [[nodiscard]] const ClockDiscipline& discipline() const { return node_.discipline(); }
+  void set_watch(WatchFeed* feed) { record_.set_watch(feed); }
   [[nodiscard]] const FollowerRecord& record() const { return record_; }
   [[nodiscard]] FollowerRecord::Status status(FreeRunningTime now) const {
     return record_.status(now);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "ftcs/daemon/real_clock.h"
+#include "ftcs/daemon/watch/follower_watch.h"
 
 namespace ftcs::daemon {
 namespace {
@@ -142,6 +143,7 @@ std::optional<std::string> FollowerRecord::add_sync(const node::Steered& steered
     status_.last_local = steered.local;
     last_used_ = steered.event;
   }
+  if (watch_ != nullptr && record.offset_known) watch_->add(watch_point(record));
   return report(record, sync_interval);
 }
 

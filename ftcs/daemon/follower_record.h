@@ -11,6 +11,7 @@
 #include "ftcs/daemon/ptp_options.h"
 #include "ftcs/daemon/run_summary.h"
 #include "ftcs/daemon/sample_report.h"
+#include "ftcs/daemon/watch/watch_feed.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/node/clock_follower.h"
 #include "ftcs/node/follower_event.h"
@@ -33,6 +34,9 @@ class FollowerRecord {
   void follow_lock(FreeRunningTime now);
   /// At the end: the summary's lines; what was learnt goes to the driftfile.
   void log_summary();
+
+  /// Who watches each sample; null: nobody.
+  void set_watch(WatchFeed* feed) { watch_ = feed; }
 
   [[nodiscard]] bool locked() const { return discipline_.locked(); }
   /// Of all used samples since the first lock.
@@ -82,6 +86,7 @@ class FollowerRecord {
   RunSummary summary_;
   Status status_;
   FreeRunningTime last_used_{};
+  WatchFeed* watch_ = nullptr;
   std::optional<FreeRunningTime> locked_since_{};
 };
 

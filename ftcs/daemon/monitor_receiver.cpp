@@ -5,6 +5,7 @@
 
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/status_report.h"
+#include "ftcs/daemon/watch/follower_watch.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::daemon {
@@ -50,6 +51,7 @@ void MonitorReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
   std::fflush(stdout);
   last_report_ = now;
+  follower_.set_watch(watch());
   log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",
         has_hardware_stamps() ? "hardware" : "software", options().monitor_socket);
 }
@@ -74,6 +76,12 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
   watch_for_silence(now);
   log_lock();
   service().turn(now, follower_.locked(), [this] { return diagnosis::sentence(finding()); });
+  publish(now, [this] {
+    WatchState state =
+        watch_state(follower_.discipline(), servo_kind_name(options().servo.kind), finding());
+    if (source_.transmitter()) state.reference.set(to_text(*source_.transmitter()).view());
+    return state;
+  });
 }
 
 diagnosis::Finding MonitorReceiver::finding() const {

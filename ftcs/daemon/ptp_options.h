@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ftcs/daemon/watch/watch.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/discipline/steering_rules.h"
 #include "ftcs/node/epoch_gate.h"
@@ -114,6 +115,8 @@ struct PtpOptions {
   std::string time_page{};            ///< file for ftcs_now.h; empty: none
   std::string chrony_socket{};        ///< refclock SOCK of a chronyd; empty: none
   std::optional<int> ntp_shm_unit{};  ///< NTP's shared memory; none: none
+
+  WatchOptions watch{};  ///< metrics and the live page
 
   int log_level = 6;         ///< syslog's: 0 emergency to 7 debug
   int summary_interval = 0;  ///< log2 of seconds

@@ -49,7 +49,8 @@ int PtpPort::run(const std::function<bool()>& stop) {
     log_(LogLevel::kError, "{}", *failure_);
     return kRuntimeError;
   }
-  if (!open_management() || !open_feed() || !open_time_page()) return kRuntimeError;
+  if (!open_management() || !open_feed() || !open_time_page() || !open_watch())
+    return kRuntimeError;
   if (options_.once_open) {
     if (const auto wrong = options_.once_open()) {
       log_(LogLevel::kError, "{}", *wrong);
@@ -119,6 +120,19 @@ bool PtpPort::open_feed() {
     log_(LogLevel::kError, "{}", feed.error());
   }
   return feed.ok();
+}
+
+bool PtpPort::open_watch() {
+  if (!options_.watch.is_wanted()) return true;
+  auto opened = Watch::open(options_.watch);
+  if (!opened) {
+    fail(opened.error());
+    log_(LogLevel::kError, "{}", *failure_);
+    return false;
+  }
+  watch_ = std::move(*opened);
+  log_(LogLevel::kNotice, "{}", watch_->where());
+  return true;
 }
 
 void PtpPort::set_scale(const ReferenceScale& scale) {

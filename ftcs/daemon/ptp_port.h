@@ -23,6 +23,7 @@
 #include "ftcs/daemon/service_report.h"
 #include "ftcs/daemon/time_feed.h"
 #include "ftcs/daemon/time_publisher.h"
+#include "ftcs/daemon/watch/watch.h"
 #include "ftcs/platform/ptp_transport.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/platform/timestamp_clock.h"
@@ -106,6 +107,20 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] platform::Kernel& kernel() { return kernel_; }
   /// Null: the clock is virtual.
   [[nodiscard]] RealClock* real_clock() { return real_clock_; }
+  /// Null: nobody watches.
+  [[nodiscard]] WatchFeed* watch() { return watch_ ? &watch_->feed() : nullptr; }
+  /// Tells those who watch, a few times a second. `state()` is asked when it is due.
+  template <class State>
+  void publish(FreeRunningTime now, const State& state) {
+    constexpr Duration kBetween{std::chrono::milliseconds{250}};
+    if (!watch_ || now < next_state_) return;
+    next_state_ = now + kBetween;
+    WatchState known = state();
+    known.kind.set("ptp");
+    known.target.set(options_.interface);
+    known.uptime_s = seconds_since_start();
+    watch_->feed().publish(known);
+  }
   [[nodiscard]] const PtpOptions& options() const { return options_; }
   [[nodiscard]] Log& log() { return log_; }
   [[nodiscard]] double seconds_since_start() { return (now() - start_.free_running).seconds(); }
@@ -123,6 +138,7 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] bool open_management();
   [[nodiscard]] bool open_feed();
   bool open_time_page();
+  [[nodiscard]] bool open_watch();
   void report_stamps();
   void turn(std::optional<FreeRunningTime> end);
 
@@ -144,6 +160,8 @@ class PtpPort : private platform::TransportHandler {
   bool stamp_missed_ = false;
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take
+  std::unique_ptr<Watch> watch_;
+  FreeRunningTime next_state_{};
   std::optional<ServiceReport> service_{std::in_place};
   std::optional<std::string> failure_{};
 };

@@ -8,6 +8,7 @@
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/port_config.h"
 #include "ftcs/daemon/status_report.h"
+#include "ftcs/daemon/watch/follower_watch.h"
 
 namespace ftcs::daemon {
 
@@ -46,6 +47,7 @@ PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Lo
 void PtpReceiver::start(FreeRunningTime now) {
   if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
   std::fflush(stdout);
+  record_.set_watch(watch());
   node_.start(now);
   take_events(now);
 }
@@ -136,6 +138,7 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   publish_time(time_bound(node_.discipline().latest(), node_.discipline().samples()));
   observer_.turn(now, totals());
   service().turn(now, node_.locked(), [this] { return service_sentence(); });
+  publish(now, [this] { return watched(); });
   if (real_clock() != nullptr) {
     const ClockDiscipline& discipline = node_.discipline();
     if (const auto wrong = real_clock()->attend(discipline.counters().commands > 0,
@@ -182,6 +185,15 @@ diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
   seen.rate = node_.discipline().latest().tracking_rate;
   if (real_clock() != nullptr) seen.refusal = real_clock()->refusal().value_or("");
   return seen;
+}
+
+WatchState PtpReceiver::watched() {
+  WatchState state = watch_state(node_.discipline(), servo_kind_name(options().servo.kind),
+                                 diagnosis::diagnose(seen()));
+  if (const ptp::TransmitterData* transmitter = node_.port().transmitter()) {
+    state.reference.set(to_text(transmitter->announce.grandmaster).view());
+  }
+  return state;
 }
 
 void PtpReceiver::log_findings(LogLevel level) {

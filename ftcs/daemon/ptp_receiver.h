@@ -57,6 +57,7 @@ class PtpReceiver : public PtpPort, private Managed {
   void on_selected(const ptp::TransmitterSelected& selected);
   [[nodiscard]] PortTotals totals();
   [[nodiscard]] diagnosis::PortSeen seen(FreeRunningTime now);
+  [[nodiscard]] WatchState watched();
   void log_findings(LogLevel level);
   void follow_scale_change();
   StateKeeper state_;

@@ -12,6 +12,7 @@
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
+#include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/ethercat/cycle_laws.h"
 #include "ftcs/daemon/ethercat/ethercat_run.h"
 #include "ftcs/daemon/ethercat/run_status.h"
@@ -325,6 +326,7 @@ void add_ethercat_command(CLI::App& app, int& exit_code) {
   add_sync_flags(*run, options);
   add_plant_time_flags(*run, options);
   add_bus_flags(*run, options);
+  add_watch_flags(*run, options.watch);
   run->callback(
       [arguments, &exit_code] { exit_code = with_options(*arguments, daemon::run_ethercat); });
 }

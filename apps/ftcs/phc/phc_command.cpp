@@ -11,6 +11,7 @@
 #include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/steering_arguments.h"
+#include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/phc/phc_options.h"
 #include "ftcs/daemon/phc/phc_runner.h"
 
@@ -276,6 +277,7 @@ void add_phc_command(CLI::App& app, int& exit_code) {
   add_servo_flags(*command, *arguments);
   add_reading_flags(*command, *arguments);
   add_rights_flags(*command, arguments->rights, true);
+  add_watch_flags(*command, arguments->options.watch);
   refuse_the_rest(*command);
   command->callback([arguments, &exit_code] {
     daemon::PhcOptions options = arguments->options;

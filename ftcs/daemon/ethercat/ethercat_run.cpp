@@ -134,6 +134,8 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const auto status = open_status(options);
   if (!status) return end_with(status.error(), kRuntimeError);
   if (*status) runner.tell(**status);
+  if (const auto wrong = runner.open_watch()) return end_with(*wrong, kRuntimeError);
+  if (options.watch.is_wanted()) fmt::print("{}\n", runner.watched_at());
   const auto setup = platform::make_realtime(options.priority, options.cpu);
   if (!options.quiet) print_setup(setup, options);
   if (!runner.bring_up(stop, false)) return end_with(runner.main().failure(), options);
@@ -153,7 +155,9 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   if (reports) end_with(reports->message, kRuntimeError);
   if (runner.main().failure()) return end_with(runner.main().failure(), options);
   if (csv || reports) return kRuntimeError;
-  if (runner.decision().state != CycleState::kLocked) return kNotLocked;
+  if (runner.decision().state != CycleState::kLocked) {
+    return end_with(std::string(runner.sentence()), kNotLocked);
+  }
   if (runner.main().last_cycle().all_operational()) return kSuccess;
   return end_with("not every drive was in OP at the end: the lines above and --json tell which",
                   kNotLocked);

@@ -62,7 +62,8 @@ MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
     : options_(options),
       link_(std::move(link)),
       node_(std::make_unique<node::CycleNode>(node_config(options, false))),
-      watch_({options.duration_s, options.trace, options.contour}) {}
+      watch_({options.duration_s, options.trace, options.contour}),
+      observer_(options) {}
 
 bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) {
   stamps_.sent = stamps_.received = HostClock::now();
@@ -158,6 +159,7 @@ void MainRunner::cycle() {
                                  HostClock::now() + Duration::from_whole_ns(limit));
   node_->end_cycle(answered, stamps_, HostClock::now());
   watch_.note(*node_, HostClock::now());
+  observer_.note(*node_, figures(), HostClock::now());
   service_.turn(HostClock::now(), decision().state == CycleState::kLocked,
                 [this] { return service_sentence(); });
   if (csv_.is_open()) {
@@ -180,14 +182,7 @@ std::optional<ReferenceTime> MainRunner::plant_now(FreeRunningTime now) {
 }
 
 std::string_view MainRunner::service_sentence() {
-  const ethercat::CycleReport& report = main().last_cycle();
-  const bool locked = decision().state == CycleState::kLocked;
-  const auto written = fmt::format_to_n(
-      sentence_.data(), sentence_.size(),
-      "{}{}: phase {:+.3f} us, margin {:.1f} us, working counter {} of {}",
-      locked ? "" : "not locked, ", name(decision().state), decision().phase_error.ns() * 1e-3,
-      figures().margin.quantile(0.5) * 1e-3, report.working_counter, report.expected);
-  return {sentence_.data(), std::min(written.size, sentence_.size())};
+  return observer_.sentence(sentence_, *node_, figures());
 }
 
 void MainRunner::print_live() const {

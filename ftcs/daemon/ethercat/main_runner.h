@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "ftcs/daemon/ethercat/cycle_csv.h"
+#include "ftcs/daemon/ethercat/cycle_observer.h"
 #include "ftcs/daemon/ethercat/plant_clock.h"
 #include "ftcs/daemon/ethercat/run_options.h"
 #include "ftcs/daemon/ethercat/run_status.h"
@@ -40,6 +41,12 @@ class MainRunner {
   [[nodiscard]] const node::DriveClocks& clocks() const { return node_->clocks(); }
   [[nodiscard]] const BusClockDecision& bus() const { return node_->bus(); }
   [[nodiscard]] std::optional<WriteError> finish_csv() { return csv_.finish(); }
+  /// Metrics and the live page, if they are wanted; before the process becomes one of real time.
+  /// Returns what is wrong, or nothing.
+  [[nodiscard]] std::optional<std::string> open_watch() { return observer_.open(); }
+  [[nodiscard]] std::string watched_at() const { return observer_.where(); }
+  /// "locked: ..." or "not locked: ...".
+  [[nodiscard]] std::string_view sentence() { return service_sentence(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).
   bool bring_up(const std::function<bool()>& stop, bool scan_only);
   /// The cyclic part.
@@ -73,7 +80,8 @@ class MainRunner {
   std::optional<PlantClock> plant_;
   RunStatus* status_ = nullptr;
   ServiceReport service_;
-  std::array<char, 160> sentence_{};  ///< the cyclic path touches no heap
+  CycleObserver observer_;
+  std::array<char, 480> sentence_{};  ///< the cyclic path touches no heap
 };
 
 }  // namespace ftcs::daemon

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "ftcs/daemon/ptp_options.h"
+#include "ftcs/daemon/watch/watch.h"
 #include "ftcs/discipline/cycle_servo.h"
 #include "ftcs/node/cycle_node.h"
 
@@ -63,6 +64,7 @@ struct RunOptions {
   std::string json;
   std::string csv;
   std::string html;
+  WatchOptions watch{};  ///< metrics and the live page
 };
 
 }  // namespace ftcs::daemon

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "ftcs/daemon/phc/port_watch.h"
+#include "ftcs/daemon/watch/watch.h"
 #include "ftcs/discipline/steering_rules.h"
 #include "ftcs/node/epoch_gate.h"
 #include "ftcs/servo/any_servo.h"
@@ -48,6 +49,7 @@ struct PhcOptions {
   std::optional<Duration> duration{};
   /// Called when all is open that only root may open; returns what failed.
   std::function<std::optional<std::string>()> once_open{};
+  WatchOptions watch{};  ///< metrics and the live page
 };
 
 }  // namespace ftcs::daemon

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <string_view>
 #include <utility>
 
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/daemon/watch/follower_watch.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::daemon {
@@ -156,9 +156,18 @@ int PhcRunner::run() {
   log_(LogLevel::kInfo, "{} {} {} (compared by {}; servo {})", sink_->name(),
        options_.free_running ? "is compared with" : "follows", source_.name(), comparison_.method(),
        servo_kind_name(options_.servo.kind));
+  if (options_.watch.is_wanted()) {
+    auto opened = Watch::open(options_.watch);
+    if (!opened) {
+      log_(LogLevel::kError, "{}", opened.error());
+      return kRuntimeError;
+    }
+    observers_ = std::move(*opened);
+    log_(LogLevel::kNotice, "{}", observers_->where());
+  }
   const platform::StopFlag stop;
   const std::int64_t start = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
-  next_raw_ns_ = start;
+  next_raw_ns_ = start_ns_ = start;
   const auto is_over = [&] {
     return options_.duration &&
            kernel_.clock_ns(CLOCK_MONOTONIC_RAW) - start >= options_.duration->floor_ns();
@@ -180,8 +189,10 @@ int PhcRunner::run() {
                                      discipline().latest().servo);
     if (wrong) fail(*wrong);
     follow_scale_change();
-    service_.turn(FreeRunningTime::from_ns(kernel_.clock_ns(CLOCK_MONOTONIC_RAW)),
-                  may && discipline().locked(), [&] { return service_sentence(may); });
+    const std::int64_t now_ns = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
+    service_.turn(FreeRunningTime::from_ns(now_ns), may && discipline().locked(),
+                  [&] { return diagnosis::sentence(finding(may)); });
+    publish(now_ns, may);
   }
   service_.stopping();
   sink_->stop();
@@ -193,12 +204,36 @@ int PhcRunner::run() {
   return finish();
 }
 
-std::string PhcRunner::service_sentence(bool follows) const {
-  if (!follows) return fmt::format("not locked: {} waits for its PTP port", sink_->name());
+diagnosis::Finding PhcRunner::finding(bool follows) const {
+  using diagnosis::Cause;
+  if (!follows) {
+    const bool answers = watch_ && watch_->port();
+    return {
+        Cause::kNoAnnounce,
+        fmt::format(
+            "{} waits for the PTP port at {}, which {}", sink_->name(), options_.port.socket,
+            answers ? fmt::format("is {}", to_string(watch_->port()->state)) : "does not answer"),
+        "a port in the state SLAVE", "-z names its socket, -n its domain; see its own status"};
+  }
+  if (const auto refused = sink_->refusal()) return {Cause::kTimescale, *refused, "", ""};
   const Telemetry& seen = discipline().latest();
-  return fmt::format("{}: {} is {:.0f} ns from {}, rate {:+.0f} ppb",
-                     discipline().locked() ? "locked" : "not locked", sink_->name(),
-                     seen.servo.offset.ns(), source_.name(), seen.tracking_rate.ppb());
+  return {discipline().locked() ? Cause::kLocked : Cause::kAcquiring,
+          fmt::format("{} is {:.0f} ns from {}, rate {:+.0f} ppb", sink_->name(),
+                      seen.servo.offset.ns(), source_.name(), seen.tracking_rate.ppb()),
+          "", ""};
+}
+
+void PhcRunner::publish(std::int64_t raw_ns, bool follows) {
+  constexpr std::int64_t kBetween_ns = 250'000'000;
+  if (!observers_ || raw_ns < next_state_ns_) return;
+  next_state_ns_ = raw_ns + kBetween_ns;
+  WatchState state =
+      watch_state(discipline(), servo_kind_name(options_.servo.kind), finding(follows));
+  state.kind.set("phc");
+  state.target.set(sink_->name());
+  state.reference.set(source_.name());
+  state.uptime_s = static_cast<double>(raw_ns - start_ns_) / static_cast<double>(kNsPerSecond);
+  observers_->feed().publish(state);
 }
 
 // Until the next reading is due or a correction has to end.
@@ -283,6 +318,11 @@ void PhcRunner::report(Duration offset, std::int64_t delay_ns, bool stepped) {
   if (stepped) record.telemetry.servo.state = ServoState::kJump;
   const bool used = record.telemetry.verdict == SampleVerdict::kUsed;
   summary_.add(record);
+  if (observers_) {
+    record.time_s = static_cast<double>(kernel_.clock_ns(CLOCK_MONOTONIC_RAW) - start_ns_) /
+                    static_cast<double>(kNsPerSecond);
+    observers_->feed().add(watch_point(record));
+  }
   if (options_.samples_per_summary < 2 || !used) {
     log_(LogLevel::kInfo, "{}",
          phc2sys_line(record, sink_->name(), source_.is_system() ? "sys" : "phc"));
@@ -301,94 +341,6 @@ int PhcRunner::finish() {
   const bool locked = discipline().locked();
   summary_.log(log_, discipline().counters(), locked, "readings");
   return locked ? kSuccess : kNotLocked;
-}
-
-namespace {
-
-/// -a: until the port's state says which clock follows which. No value: stopped before.
-std::optional<Pairing> wait_for_pairing(platform::Kernel& kernel, const PhcOptions& options,
-                                        Log& log, PortWatch& watch) {
-  constexpr int kTurnMs = 50;
-  const platform::StopFlag stop;
-  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
-  std::optional<ptp::PortState> said;
-  for (std::int64_t now = start;; now = kernel.clock_ns(CLOCK_MONOTONIC_RAW)) {
-    if (auto wanted = pairing(watch, options.system_may_lead)) return wanted;
-    if (watch.port() && watch.port()->state != said) {
-      said = watch.port()->state;
-      log(LogLevel::kNotice, "the PTP port is {}: waiting", to_string(*said));
-    }
-    if (stop.is_set()) return std::nullopt;
-    if (options.duration && now - start >= options.duration->floor_ns()) return std::nullopt;
-    watch.attend(now);
-    (void)kernel.poll({}, kTurnMs);
-  }
-}
-
-/// -a: one run after another, each with the clocks that the port then asks for.
-int run_automatic(platform::Kernel& kernel, PhcOptions options, Log& log, PortWatch watch) {
-  const std::int64_t start = kernel.clock_ns(CLOCK_MONOTONIC_RAW);
-  const auto duration = options.duration;
-  const auto first_step = options.first_step_threshold;
-  std::set<std::string> steered;
-  for (;;) {
-    if (duration) {
-      const std::int64_t gone = kernel.clock_ns(CLOCK_MONOTONIC_RAW) - start;
-      options.duration = *duration - Duration::from_whole_ns(gone);
-    }
-    const auto wanted = wait_for_pairing(kernel, options, log, watch);
-    if (!wanted) return kNotLocked;
-    if (!watch.port()->hardware_timestamps) {
-      log(LogLevel::kError,
-          "the PTP port on {} takes software timestamps: its clock is the system clock already",
-          wanted->interface);
-      return kRuntimeError;
-    }
-    const std::string system = "CLOCK_REALTIME";
-    options.source = wanted->port_leads ? wanted->interface : system;
-    options.sink = wanted->port_leads ? system : wanted->interface;
-    // A clock that was near its source is not to jump because it has another one now.
-    options.first_step_threshold = steered.contains(options.sink) ? Nanoseconds{0} : first_step;
-    auto runner = PhcRunner::open(kernel, options, log);
-    if (!runner) {
-      log(LogLevel::kError, "{}", runner.error());
-      return kRuntimeError;
-    }
-    (*runner)->follow_port(std::move(watch), wanted);
-    const int code = (*runner)->run();
-    auto moved = (*runner)->take_moved_port();
-    if (!moved || code == kRuntimeError) return code;
-    if ((*runner)->has_steered()) steered.insert(options.sink);
-    watch = std::move(*moved);
-  }
-}
-
-}  // namespace
-
-int run_phc(platform::Kernel& kernel, const PhcOptions& options, Log& log) {
-  const auto refuse = [&log](const std::string& reason) {
-    log(LogLevel::kError, "{}", reason);
-    return kRuntimeError;
-  };
-  std::optional<PortWatch> watch;
-  if (options.automatic || options.wait_for_port) {
-    auto opened = PortWatch::open(options.port);
-    if (!opened) return refuse(opened.error().message());
-    watch.emplace(std::move(*opened));
-    const PortAddress& port = options.port;
-    log(LogLevel::kNotice,
-        "waiting for the PTP port at {}, domain {}, transportSpecific {} (-z, -n and "
-        "--transportSpecific name another)",
-        port.socket, port.domain, port.major_sdo_id);
-  }
-  if (options.automatic) return run_automatic(kernel, options, log, std::move(*watch));
-  auto runner = PhcRunner::open(kernel, options, log);
-  if (!runner) return refuse(runner.error());
-  if (watch) (*runner)->follow_port(std::move(*watch), std::nullopt);
-  if (options.once_open) {
-    if (const auto wrong = options.once_open()) return refuse(*wrong);
-  }
-  return (*runner)->run();
 }
 
 }  // namespace ftcs::daemon

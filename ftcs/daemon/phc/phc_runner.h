@@ -12,6 +12,8 @@
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/run_summary.h"
 #include "ftcs/daemon/service_report.h"
+#include "ftcs/daemon/watch/watch.h"
+#include "ftcs/diagnosis/finding.h"
 #include "ftcs/node/clock_follower.h"
 #include "ftcs/platform/clock_device.h"
 
@@ -50,7 +52,8 @@ class PhcRunner {
   PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
 
   void wait();
-  [[nodiscard]] std::string service_sentence(bool follows) const;
+  [[nodiscard]] diagnosis::Finding finding(bool follows) const;
+  void publish(std::int64_t raw_ns, bool follows);
   void follow_scale_change();
   [[nodiscard]] bool may_follow();
   [[nodiscard]] bool port_is_usable() const;
@@ -79,6 +82,9 @@ class PhcRunner {
   std::uint64_t scales_heard_ = 0;
   RunSummary summary_;
   std::int64_t next_raw_ns_ = 0;
+  std::int64_t start_ns_ = 0;
+  std::int64_t next_state_ns_ = 0;
+  std::unique_ptr<Watch> observers_;  ///< null: nobody watches
   bool reading_failed_ = false;
   std::optional<std::string> failure_;
   ServiceReport service_{};
