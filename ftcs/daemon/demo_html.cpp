@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include <fmt/format.h>
 
 #include "ftcs/daemon/demo_report.h"
@@ -12,14 +16,19 @@ namespace {
 
 Plot offset_plot_of(const DemoResult& result) {
   Plot plot;
-  plot.title = "PTP: true offset at each Sync message, local minus reference";
+  plot.title = "PTP: how far off the clock was at each Sync message";
   plot.x_label = "Sync message";
-  plot.y_label = "us";
+  plot.y_label = "|true offset| / ns";
+  plot.log_y = true;  // the first millisecond and the last nanoseconds in one picture
+  constexpr double kLeast_ns = 1.0;
   for (const experiment::TrialResult& servo : result.servos) {
-    plot.series.push_back(trace_series(servo.servo, servo.true_offsets_ns, 1.0, 1e3));
+    std::vector<double> sizes;
+    for (const double offset : servo.true_offsets_ns) {
+      sizes.push_back(std::max(std::abs(offset), kLeast_ns));
+    }
+    plot.series.push_back(trace_series(servo.servo, sizes, 1.0, 1.0));
   }
-  plot.note = fmt::format("The lock band is ±{}. Zoom in to see more than the first jump.",
-                          format_time(result.lock_band_ns));
+  plot.note = fmt::format("The lock band is ±{}.", format_time(result.lock_band_ns));
   return plot;
 }
 

@@ -2,8 +2,26 @@
 #include "ftcs/daemon/management_client.h"
 
 #include <chrono>
+#include <string_view>
+#include <vector>
 
 namespace ftcs::daemon {
+namespace {
+
+/// linuxptp after 4.4 has its sockets in a folder of their own, and one that only answers: where
+/// DIR/ptp4l is meant, DIR/ptp/ptp4l is too, and those that may be asked by everybody.
+std::vector<std::string> names_of(const std::string& path) {
+  constexpr std::string_view kName = "/ptp4l";
+  if (!path.ends_with(kName)) return {path};
+  const std::string folder = path.substr(0, path.size() - kName.size());
+  std::vector<std::string> names;
+  for (const char* name : {"/ptp/ptp4l", "/ptp4l", "/ptp/ptp4lro", "/ptp4lro"}) {
+    names.push_back(folder + name);
+  }
+  return names;
+}
+
+}  // namespace
 
 Result<ManagementClient, platform::OsError> ManagementClient::open(const PortAddress& address) {
   auto socket = platform::LocalSocket::client();
@@ -21,7 +39,10 @@ void ManagementClient::ask(ptp::ManagementId id) {
   question.body.target.port = 0xFFFF;
   question.id = id;
   question.header.sequence_id = ++asked_;
-  (void)socket_.send(address_.socket, ptp::encode_management(question).view());
+  const auto bytes = ptp::encode_management(question);
+  for (const std::string& name : names_of(address_.socket)) {
+    if (!socket_.send(name, bytes.view())) return;  // somebody has it
+  }
 }
 
 std::optional<ptp::ManagementData> ManagementClient::next_answer() {

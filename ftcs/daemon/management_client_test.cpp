@@ -40,6 +40,26 @@ void answer(LocalSocket& ptp4l, const Question& question, ptp::ManagementId id,
   EXPECT_FALSE(ptp4l.send(question.sender, ptp::encode_management(message).view()));
 }
 
+TEST(ManagementClient, finds_the_sockets_of_old_and_of_new_linuxptp) {
+  for (const char* name : {"/ptp4l", "/ptp/ptp4l", "/ptp4lro", "/ptp/ptp4lro"}) {
+    std::string folder = (std::filesystem::temp_directory_path() / "ftcs-client-XXXXXX").string();
+    ASSERT_NE(mkdtemp(folder.data()), nullptr);
+    std::filesystem::create_directory(folder + "/ptp");
+    auto ptp4l = LocalSocket::bind(folder + name);
+    ASSERT_TRUE(ptp4l.ok());
+    PortAddress address;
+    address.socket = folder + "/ptp4l";  // as --ptp4l-socket and -z have it
+    auto client = ManagementClient::open(address);
+    ASSERT_TRUE(client.ok());
+    client->ask(ptp::ManagementId::kPortDataSet);
+    const Question question = receive_question(*ptp4l);
+    EXPECT_FALSE(question.sender.empty()) << name;
+    answer(*ptp4l, question, ptp::ManagementId::kPortDataSet, ptp::PortDataSet{});
+    EXPECT_TRUE(client->next_answer()) << name;
+    std::filesystem::remove_all(folder);
+  }
+}
+
 TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) {
   std::string folder = (std::filesystem::temp_directory_path() / "ftcs-client-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);

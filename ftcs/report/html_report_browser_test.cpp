@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <regex>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -40,6 +42,9 @@ HtmlReport report_of_every_kind() {
   Plot trace{"Offset", "time / s", "offset / ns", false, false, PlotStyle::kLine, {}, "One spike."};
   trace.series = {trace_series("</script><i>", offsets, 0.1, 1.0),
                   trace_series("b", offsets, 0.3, 2.0)};
+  report.add_plot(trace);
+  trace.title = "One of them again";
+  trace.series.erase(trace.series.begin());
   report.add_plot(trace);
   Plot bars{"Histogram", "offset / ns", "samples", false, false, PlotStyle::kFilledSteps, {}, ""};
   bars.series = {histogram_series("samples", histogram(offsets), 1.0)};
@@ -78,10 +83,18 @@ TEST(HtmlReportInBrowser, opens_without_a_console_message_and_shows_its_plots) {
   std::string dom = content(folder / "dom");
   dom.resize(dom.find("<script"));  // the library's own text would be counted too
   EXPECT_EQ(log.find("CONSOLE"), std::string::npos) << log;
-  EXPECT_EQ(count(dom, "<canvas"), 8);  // dygraphs lays two over each other for every plot
+  EXPECT_EQ(count(dom, "<canvas"), 10);  // dygraphs lays two over each other for every plot
   EXPECT_GT(count(dom, "dygraph-axis-label-x"), 8);
   EXPECT_GT(count(dom, "dygraph-axis-label-y"), 8);
-  EXPECT_EQ(count(dom, "class=\"dygraph-legend-line\""), 6);
+  EXPECT_EQ(count(dom, "class=\"dygraph-legend-line\""), 7);
+  const std::regex line_of_b(
+      "color: ([^;\"]+)[^>]*>\\s*<div class=\"dygraph-legend-line\"[^>]*></div>\\s*b<");
+  std::vector<std::string> colours;
+  for (std::sregex_iterator at(dom.begin(), dom.end(), line_of_b), end; at != end; ++at) {
+    colours.push_back((*at)[1]);
+  }
+  ASSERT_EQ(colours.size(), 2U) << dom;
+  EXPECT_EQ(colours[0], colours[1]) << "one name, one colour";
   EXPECT_EQ(dom.find("<i>"), std::string::npos);
   std::filesystem::remove_all(folder);
 }

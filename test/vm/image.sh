@@ -2,6 +2,9 @@
 # The initial file system of the virtual machine, in two archives: the system's programs and the kernel's modules (made once), and what
 # is tried on them (made for each run). Sourced by prepare and run.
 
+# shellcheck source=test/vm/systemd.sh
+source "$here/systemd.sh"
+
 # A program at its own name in /usr/bin, its libraries at their own places.
 add_program() {  # ROOT PROGRAM
   local file library
@@ -66,6 +69,7 @@ make_job_image() {  # ARCHIVE JOB_FILE SEED
   strip -g "$root/modules/vptp.ko"
   cp "$here"/guest/* "$root/guest/"
   install -m 755 "$here/guest/init" "$root/init"
+  ! grep -q '^# vm: systemd' "$2" || add_systemd "$root"
   install -m 755 "$here/guest/at" "$root/usr/bin/at"
   { echo "SEED=$3"; echo ". /guest/lib.sh"; cat "$2"; echo finish; } > "$root/job"
   archive "$root" "$1"

@@ -2,6 +2,7 @@
 #include "ftcs/daemon/phc/phc_runner.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -53,6 +54,13 @@ Result<UtcConfig, std::string> utc_config(const PhcOptions& options) {
 Result<ClockDevice, platform::OsError> open_clock(platform::Kernel& kernel, const std::string& name,
                                                   ClockAccess access) {
   if (name == "CLOCK_REALTIME") return ClockDevice::open_system(kernel, access);
+  // Linux 6.17 has them: no device of theirs can be compared with a PTP clock's in one call yet.
+  if (name.starts_with("CLOCK_AUX")) {
+    return platform::os_error(
+        EOPNOTSUPP, name +
+                        " (ftcs ethercat run --plant-time aux0 reads such a clock; expected here: "
+                        "CLOCK_REALTIME, /dev/ptpN or an interface)");
+  }
   if (name.find('/') != std::string::npos) return ClockDevice::open_phc(kernel, name, access);
   return ClockDevice::open_phc_of(kernel, name, access);
 }

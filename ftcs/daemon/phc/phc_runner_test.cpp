@@ -347,6 +347,10 @@ TEST(PhcRunner, says_what_cannot_be_opened_and_touches_nothing) {
   };
   world.options.source = "/dev/ptp5";
   EXPECT_EQ(error(), "/dev/ptp5: no such device");
+  world.options.source = "CLOCK_AUX0";
+  EXPECT_NE(error().find("expected here: CLOCK_REALTIME, /dev/ptpN or an interface"),
+            std::string::npos)
+      << error();
   world.options.source = "CLOCK_REALTIME";
   EXPECT_EQ(error(), "CLOCK_REALTIME: source and sink are the same clock");
   world.kernel.held_names.clear();

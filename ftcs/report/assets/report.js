@@ -63,8 +63,23 @@
     });
   }
 
+  // A name has one colour in all plots of the page: its place in the order in which names come first. Where that would be
+  // another's in the same plot, as there are more names than colours, it is the next free one.
+  var places = new Map();
+  function places_of(plot) {
+    var taken = new Set();
+    return plot.series.map(function (series) {
+      if (!places.has(series.name)) places.set(series.name, places.size % light.length);
+      var place = places.get(series.name);
+      while (taken.has(place) && taken.size < light.length) place = (place + 1) % light.length;
+      taken.add(place);
+      return place;
+    });
+  }
+
   function colours(plot) {
-    return { colors: (scheme.matches ? dark : light).slice(0, plot.series.length), axisLineColor: css('--line'),
+    var palette = scheme.matches ? dark : light;
+    return { colors: places_of(plot).map(function (place) { return palette[place]; }), axisLineColor: css('--line'),
              gridLineColor: css('--grid') };
   }
 
