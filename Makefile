@@ -67,9 +67,9 @@ bench: deps-test
 
 docs:
 	@tools/install-deps docs
-	@# Links that lead out of docs/ are for the repository.
 	@rm -rf build-docs
-	@mkdocs build --quiet 2>&1 | grep -v "not found in the documentation files"; ls build-docs/index.html
+	@mkdocs build --quiet --strict
+	@ls build-docs/index.html
 
 deb:
 	@tools/install-deps build package

@@ -7,7 +7,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 fail() { echo "$*" >&2; exit 1; }
 
-for command in "" analyse compare demo ethercat ethercat-segment paper phc ptp simulate status; do
+for command in "" analyse compare demo doctor ethercat ethercat-segment paper phc ptp simulate status; do
   # shellcheck disable=SC2086
   "$ftcs" manual man $command > "$work/page.1"
   grep -q '^.SH NAME' "$work/page.1" || fail "no page of '$command'"
