@@ -43,14 +43,14 @@ void add_watch_flags(CLI::App& command, daemon::WatchOptions& options) {
       ->type_name("FILE")
       ->check(folder_is_there);
   command
-      .add_option("--metrics-names", options.names,
-                  "ftcs (default) or openshift: names of OpenShift's PTP operator")
-      ->type_name("NAMES")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, daemon::MetricsNames>{
-              {"ftcs", daemon::MetricsNames::kFtcs},
-              {"openshift", daemon::MetricsNames::kOpenShift}},
-          CLI::ignore_case));
+      .add_option_function<std::string>(
+          "--metrics-names",
+          [&options](const std::string& name) {
+            options.names = name == "openshift" ? daemon::MetricsNames::kOpenShift
+                                                : daemon::MetricsNames::kFtcs;
+          },
+          "ftcs (default) or openshift: names of OpenShift's PTP operator")
+      ->check(CLI::IsMember({"ftcs", "openshift"}));
 }
 
 }  // namespace ftcs::app
