@@ -32,7 +32,7 @@ struct Answer {
 /// The answer, or what is wrong.
 Result<Answer, std::string> ask(const std::string& path) {
   constexpr int kPatienceMs = 2000;
-  auto client = platform::LocalSocket::client();
+  auto client = platform::LocalSocket::client(path);
   if (!client) return client.error().message();
   if (const auto error = client->send(path, octets(daemon::kStatusQuery))) return error->message();
   client->wait(kPatienceMs);

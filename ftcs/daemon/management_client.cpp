@@ -24,7 +24,7 @@ std::vector<std::string> names_of(const std::string& path) {
 }  // namespace
 
 Result<ManagementClient, platform::OsError> ManagementClient::open(const PortAddress& address) {
-  auto socket = platform::LocalSocket::client();
+  auto socket = platform::LocalSocket::client(address.socket);
   if (!socket) return socket.error();
   return ManagementClient(address, std::move(*socket));
 }

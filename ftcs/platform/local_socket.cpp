@@ -116,10 +116,22 @@ Result<LocalSocket, OsError> LocalSocket::bind(const std::string& path) {
   return LocalSocket(fd, path, "");
 }
 
-Result<LocalSocket, OsError> LocalSocket::client() {
+namespace {
+
+std::string folder_for_client(const std::string& server) {
+  const std::size_t slash = server.rfind('/');
+  if (slash != std::string::npos && slash > 0) {
+    const std::string beside = server.substr(0, slash);
+    if (::access(beside.c_str(), W_OK) == 0) return beside;
+  }
   const char* const given = std::getenv("TMPDIR");  // one thread
-  std::string folder = std::string(given != nullptr && *given != '\0' ? given : "/tmp");
-  folder += "/ftcs-XXXXXX";
+  return given != nullptr && *given != '\0' ? given : "/tmp";
+}
+
+}  // namespace
+
+Result<LocalSocket, OsError> LocalSocket::client(const std::string& server) {
+  std::string folder = folder_for_client(server) + "/ftcs-XXXXXX";
   if (::mkdtemp(folder.data()) == nullptr) return path_error(errno, folder);
   const std::string path = folder + "/socket";
   const auto address = address_of(path);

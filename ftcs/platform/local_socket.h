@@ -20,10 +20,11 @@ class LocalSocket {
   /// A file that a dead program left behind is replaced; one that somebody serves is
   /// kAddressInUse, and so is a file that is no socket. Owner and group may write to it.
   [[nodiscard]] static Result<LocalSocket, OsError> bind(const std::string& path);
-  /// Bound to a file of its own in a new folder under $TMPDIR or /tmp, so that it can be answered
-  /// from another network namespace too: by root, by our own user, and, once something was sent to
-  /// it, by the group of a server's socket.
-  [[nodiscard]] static Result<LocalSocket, OsError> client();
+  /// Bound to a file of its own in a new folder: beside `server`, whom it is to ask, where we may
+  /// write there, as a service may have a /tmp of its own; else under $TMPDIR or /tmp. It can be
+  /// answered from another network namespace too: by root, by our own user, and, once something was
+  /// sent to it, by the group of a server's socket.
+  [[nodiscard]] static Result<LocalSocket, OsError> client(const std::string& server = {});
 
   LocalSocket(LocalSocket&& other) noexcept;
   LocalSocket& operator=(LocalSocket&& other) noexcept;

@@ -49,6 +49,17 @@ class LocalSockets : public testing::Test {
   std::filesystem::path folder;
 };
 
+TEST_F(LocalSockets, a_client_is_beside_its_server_where_it_may_be) {
+  const auto beside = LocalSocket::client(file("server"));
+  ASSERT_TRUE(beside.ok());
+  EXPECT_TRUE(beside->path().starts_with(folder.string() + "/ftcs-")) << beside->path();
+  const auto elsewhere = LocalSocket::client("/nowhere/server");
+  ASSERT_TRUE(elsewhere.ok());
+  EXPECT_TRUE(
+      elsewhere->path().starts_with(std::filesystem::temp_directory_path().string() + "/ftcs-"))
+      << elsewhere->path();
+}
+
 TEST_F(LocalSockets, AClientIsAnswered) {
   auto server = LocalSocket::bind(file("server"));
   ASSERT_TRUE(server.ok());
