@@ -18,6 +18,6 @@ while IFS= read -r line; do
     exit 1
   fi
   lines=$((lines + 1))
-done < <(grep -h '^Exec' "$packaging"/systemd/*.service)
+done < <(grep -h '^Exec.*/usr/bin/ftcs' "$packaging"/systemd/*.service)
 [ "$lines" -ge 4 ] || { echo "$lines command lines, expected 4 or more" >&2; exit 1; }
 echo "$lines command lines are understood"
