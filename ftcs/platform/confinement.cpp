@@ -119,8 +119,47 @@ constexpr Calls kRealTime = {
 constexpr Calls kThreads = {"set_robust_list", "set_tid_address", "membarrier"};
 constexpr Calls kServer = {"accept",    "accept4",    "epoll_create1",
                            "epoll_ctl", "epoll_wait", "epoll_pwait"};
-constexpr Calls kChangeOfUser = {"setuid", "setgid", "setresuid", "setresgid", "setgroups",
-                                 "capget", "capset", "getresuid", "getresgid"};
+/// What the same calls are called where a word has 32 bits.
+constexpr Calls kOf32Bits = {
+    "mmap2",
+    "fstat64",
+    "stat64",
+    "lstat64",
+    "fstatat64",
+    "fcntl64",
+    "_llseek",
+    "ftruncate64",
+    "statfs64",
+    "fstatfs64",
+    "ugetrlimit",
+    "getuid32",
+    "geteuid32",
+    "getgid32",
+    "getegid32",
+    "getgroups32",
+    "_newselect",
+    "sigreturn",
+    "set_tls",
+    "cacheflush",
+    "clock_gettime64",
+    "clock_getres_time64",
+    "clock_nanosleep_time64",
+    "futex_time64",
+    "ppoll_time64",
+    "pselect6_time64",
+    "timerfd_settime64",
+    "timerfd_gettime64",
+    "recvmmsg_time64",
+    "utimensat_time64",
+    "socketcall",
+    "ipc",
+};
+constexpr Calls kSteeringOf32Bits = {"clock_adjtime64", "clock_settime64"};
+
+constexpr Calls kChangeOfUser = {"setuid",      "setgid",      "setresuid",   "setresgid",
+                                 "setgroups",   "capget",      "capset",      "getresuid",
+                                 "getresgid",   "setuid32",    "setgid32",    "setresuid32",
+                                 "setresgid32", "setgroups32", "getresuid32", "getresgid32"};
 
 Calls calls_of(SystemCalls kind) {
   switch (kind) {
@@ -167,8 +206,7 @@ class Filter {
   }
   void allow_names_of_threads() {
     for (const int option : {PR_SET_NAME, PR_GET_NAME, PR_SET_TIMERSLACK}) {
-      keep(seccomp_rule_add(context_, SCMP_ACT_ALLOW, SCMP_SYS(prctl), 1,
-                            SCMP_A0(SCMP_CMP_EQ, static_cast<scmp_datum_t>(option))));
+      allow_if(SCMP_SYS(prctl), {0, SCMP_CMP_EQ, static_cast<scmp_datum_t>(option), 0});
     }
   }
   void allow_change_of_user() {
@@ -178,8 +216,7 @@ class Filter {
   /// A thread of this process, no process: clone3 hides its flags, and glibc does without.
   void allow_threads() {
     allow(kThreads);
-    keep(seccomp_rule_add(context_, SCMP_ACT_ALLOW, SCMP_SYS(clone), 1,
-                          SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)));
+    allow_if(SCMP_SYS(clone), {0, SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD});
     keep(seccomp_rule_add(context_, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0));
   }
   [[nodiscard]] std::optional<std::string> load() {
@@ -189,6 +226,9 @@ class Filter {
   }
 
  private:
+  void allow_if(int call, const scmp_arg_cmp& first) {
+    keep(seccomp_rule_add_array(context_, SCMP_ACT_ALLOW, call, 1, &first));
+  }
   void keep(int code) {
     const bool known = code == -EEXIST || code == -EDOM;
     if (code < 0 && code_ == 0 && !known) code_ = code;
@@ -200,11 +240,13 @@ class Filter {
 std::optional<std::string> load_filter(const Confinement& confinement) {
   Filter filter;
   filter.allow(kEveryProgram);
+  if (sizeof(void*) == 4) filter.allow(kOf32Bits);
   for (const SystemCalls kind : confinement.calls) {
     if (kind == SystemCalls::kThreads) {
       filter.allow_threads();
     } else {
       filter.allow(calls_of(kind));
+      if (kind == SystemCalls::kSteering) filter.allow(kSteeringOf32Bits);
     }
   }
   if (confinement.will_change_user) {

@@ -105,7 +105,7 @@ def main():
     ftcs = os.path.realpath(sys.argv[1])
     cases = [case for case in CASES + GOOD if len(sys.argv) < 3 or sys.argv[2] in case["name"]]
     failures = 0
-    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+    with concurrent.futures.ThreadPoolExecutor(9) as pool:
         answers = pool.map(lambda numbered: examine(ftcs, *numbered), enumerate(cases))
         for case, (wrong, sentence) in zip(cases, answers):
             print(f"{'FAILED' if wrong else 'ok':6} {case['name']:34} {case['cause']:22} {sentence}", flush=True)
