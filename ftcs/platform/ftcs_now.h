@@ -57,6 +57,11 @@ struct ftcs_time {
   int64_t latest_ns;
 };
 
+#ifdef __cplusplus
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast" /* C has no other */
+#endif
+
 /* Maps the page, to read. NULL with errno: it cannot be had. It stays mapped until the program
  * ends. */
 static inline const struct ftcs_time_page* ftcs_open_time(const char* path) {
@@ -113,6 +118,7 @@ static inline enum ftcs_time_state ftcs_now(const struct ftcs_time_page* page,
 }
 
 #ifdef __cplusplus
+#pragma GCC diagnostic pop
 }
 #endif
 
