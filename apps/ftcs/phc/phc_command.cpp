@@ -10,6 +10,7 @@
 #include "apps/ftcs/config_file.h"
 #include "apps/ftcs/epoch_arguments.h"
 #include "apps/ftcs/number_check.h"
+#include "apps/ftcs/rights.h"
 #include "apps/ftcs/steering_arguments.h"
 #include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/phc/phc_options.h"
