@@ -29,7 +29,7 @@ for mechanism in E2E P2P; do
   for setting in "ingressLatency 500" "egressLatency 300" "delayAsymmetry 200" "delayAsymmetry -200"; do
     read -r name value <<< "$setting"
     theirs=$(seen ptp4l "--$name" "$value")
-    ours=$(seen "$ftcs" ptp --unicast 192.168.123.1 --allow-epoch --max-change 0 --max-total-change 0 --clock phc "--$name" "$value")
+    ours=$(seen "$ftcs" ptp --unconfined --unicast 192.168.123.1 --allow-epoch --max-change 0 --max-total-change 0 --clock phc "--$name" "$value")
     echo "$mechanism, $setting: offset and path delay $theirs with ptp4l, $ours here"
     read -r a b c d <<< "$theirs $ours"
     if [ -z "$d" ] || [ $((a - c)) -gt 2 ] || [ $((c - a)) -gt 2 ] || [ $((b - d)) -gt 2 ] || [ $((d - b)) -gt 2 ]; then

@@ -24,7 +24,7 @@ day() {  # TAI - UTC after midnight, more flags
   printf 'node1_offset = -36\nnode1_freq = 5e-6\nnode1_refclock = (* 100e-9 (normal))\n' > "$folder/conf"
   setpriv --bounding-set -sys_time --inh-caps -sys_time env CLKNETSIM_START_DATE=$start CLKNETSIM_RANDOM_SEED=1 \
     LD_PRELOAD="$CLKNETSIM_PATH/clknetsim.so" CLKNETSIM_NODE=1 CLKNETSIM_SOCKET="$folder/socket" \
-    "$ftcs" phc --allow-epoch --max-change 0 --max-total-change 0 -s /dev/ptp0 --leapfile "$folder/list" -R 0.25 -l 5 "$@" > "$folder/log" 2>&1 &
+    "$ftcs" phc --unconfined --allow-epoch --max-change 0 --max-total-change 0 -s /dev/ptp0 --leapfile "$folder/list" -R 0.25 -l 5 "$@" > "$folder/log" 2>&1 &
   local node=$!
   pids=("$node")
   CLKNETSIM_RANDOM_SEED=3 "$CLKNETSIM_PATH/clknetsim" -s "$folder/socket" -l 86600 -o "$folder/offsets" "$folder/conf" 1 \

@@ -32,7 +32,7 @@ delay_mechanism $mechanism
 EOF
   pids=()
   start_node 1 ptp4l -f "$folder/transmitter.conf" -i eth0 -m -q
-  start_node 2 "$ftcs" ptp -i eth0 --unicast 192.168.123.1 --time_stamping "$kind" --delay_mechanism "$mechanism" --summary_interval -7
+  start_node 2 "$ftcs" ptp -i eth0 --unconfined --unicast 192.168.123.1 --time_stamping "$kind" --delay_mechanism "$mechanism" --summary_interval -7
   "$CLKNETSIM_PATH/clknetsim" -s "$folder/sock" -l "$seconds" "$folder/conf" 2 \
     > "$folder/stats" 2> "$folder/log" || { cat "$folder/log" "$folder"/log.*; return 1; }
   wait "${pids[1]}" && result=0 || result=$?
