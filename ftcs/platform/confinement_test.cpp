@@ -40,9 +40,18 @@ std::string status_line(const std::string& name) {
   return {};
 }
 
+class ConfinementTest : public testing::Test {
+ protected:
+  void SetUp() override {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "a sanitizer makes calls of its own: there is no filter and no limit of memory";
+#endif
+  }
+};
+
 const Confinement kReader{.calls = {SystemCalls::kFiles}};
 
-TEST(Confinement, a_call_that_no_list_names_ends_the_process) {
+TEST_F(ConfinementTest, a_call_that_no_list_names_ends_the_process) {
   const char* const arguments[] = {"/bin/true", nullptr};
   EXPECT_EQ(outcome(kReader, [&] { return ::execv("/bin/true", const_cast<char**>(arguments)); }),
             -SIGSYS);
@@ -55,7 +64,7 @@ TEST(Confinement, a_call_that_no_list_names_ends_the_process) {
       << "it has no network";
 }
 
-TEST(Confinement, what_its_lists_name_goes_on) {
+TEST_F(ConfinementTest, what_its_lists_name_goes_on) {
   EXPECT_EQ(outcome(kReader, [] { return std::ifstream("/proc/self/status") ? 0 : 1; }), 0);
   const Confinement network{.calls = {SystemCalls::kNetwork}};
   EXPECT_EQ(outcome(network, [] { return ::socket(AF_INET, SOCK_DGRAM, 0) < 0 ? 1 : 0; }), 0);
@@ -71,7 +80,7 @@ TEST(Confinement, what_its_lists_name_goes_on) {
       << "a thread is no process";
 }
 
-TEST(Confinement, the_kernel_knows_it) {
+TEST_F(ConfinementTest, the_kernel_knows_it) {
   EXPECT_EQ(outcome(kReader,
                     [] {
                       if (status_line("CapEff") != "0000000000000000") return 1;
@@ -93,7 +102,7 @@ TEST(Confinement, the_kernel_knows_it) {
             0);
 }
 
-TEST(Confinement, memory_is_bounded) {
+TEST_F(ConfinementTest, memory_is_bounded) {
   Confinement small = kReader;
   small.most_memory = std::uint64_t{64} << 20;
   EXPECT_EQ(outcome(small,
@@ -106,7 +115,7 @@ TEST(Confinement, memory_is_bounded) {
             0);
 }
 
-TEST(Confinement, another_user_keeps_the_capabilities_and_no_way_back) {
+TEST_F(ConfinementTest, another_user_keeps_the_capabilities_and_no_way_back) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can become somebody";
   const auto nobody = find_user("nobody");
   if (!nobody) GTEST_SKIP() << "no such user here";
