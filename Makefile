@@ -54,7 +54,7 @@ else
 	@test/vm/run $(VM_FLAGS) $(JOB)
 endif
 
-test-embedded: deps
+test-embedded: build
 	@test/embedded/run.sh
 
 bench: deps-test

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <type_traits>
+#include <utility>
 
 #include "bench/ethercat_cases.h"
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/measurement/outlier_gate.h"
 #include "ftcs/measurement/path_delay_estimator.h"
+#include "ftcs/platform/keyed_code.h"
+#include "ftcs/ptp/security_association.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "ftcs/servo/any_servo.h"
 
@@ -192,6 +198,41 @@ struct DecodeCase {
   }
 };
 
+/// A key of each type of the sa_file, as a port has it.
+template <platform::CodeKind kKind>
+struct KeyCase {
+  KeyCase() {
+    constexpr std::array<std::uint8_t, 32> kKey{1, 2, 3};
+    const std::size_t size = platform::key_octets(kKind);
+    code =
+        std::move(*platform::KeyedCode::open(kKind, std::span(kKey).first(size == 0 ? 32 : size)));
+    association.active_key_id = 1;
+    association.add({1, platform::code_octets(kKind), code.get()});
+  }
+  std::unique_ptr<platform::KeyedCode> code;
+  ptp::SecurityAssociation association{};
+  ptp::MessageBytes plain = ptp::encode(ptp::Message{ptp::Header{}, ptp::Sync{}}).value();
+};
+
+/// A Sync gets its authentication code.
+template <platform::CodeKind kKind>
+struct SealCase : KeyCase<kKind> {
+  bool step() noexcept {
+    ++this->plain.octets[31];
+    ptp::MessageBytes message = this->plain;
+    return ptp::seal(this->association, message);
+  }
+};
+
+/// The code of a Sync is verified.
+template <platform::CodeKind kKind>
+struct AuthenticateCase : KeyCase<kKind> {
+  AuthenticateCase() { static_cast<void>(ptp::seal(this->association, this->plain)); }
+  ptp::Authenticity step() noexcept {
+    return ptp::authenticate(this->association, this->plain.view());
+  }
+};
+
 /// Calls visit(name, std::type_identity of the case) for each case: none is made that is not asked
 /// for, some take a bring-up.
 template <class Visit>
@@ -216,6 +257,12 @@ void for_each_case(const Visit& visit) {
   visit("decode_follow_up", std::type_identity<DecodeCase<ptp::FollowUp>>{});
   visit("decode_delay_resp", std::type_identity<DecodeCase<ptp::DelayResp>>{});
   visit("decode_announce", std::type_identity<DecodeCase<ptp::Announce>>{});
+  using platform::CodeKind;
+  visit("seal_sha256_128", std::type_identity<SealCase<CodeKind::kHmacSha256Truncated>>{});
+  visit("authenticate_sha256_128",
+        std::type_identity<AuthenticateCase<CodeKind::kHmacSha256Truncated>>{});
+  visit("authenticate_sha256", std::type_identity<AuthenticateCase<CodeKind::kHmacSha256>>{});
+  visit("authenticate_aes128", std::type_identity<AuthenticateCase<CodeKind::kCmacAes128>>{});
   visit("ethercat_wire_alone", std::type_identity<EthercatWireCase>{});
   visit("ethercat_cycle_ftcs", std::type_identity<EthercatCycleCase<CycleLaw::kFtcs>>{});
   visit("ethercat_cycle_adaptive", std::type_identity<EthercatCycleCase<CycleLaw::kAdaptive>>{});

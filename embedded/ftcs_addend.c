@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "ftcs_addend_private.h"
 
-/* nominal (1 + ppm / 10^6) */
-int64_t ftcs_addend_beyond(uint32_t nominal, uint32_t ppm) {
-  const int64_t addend = (int64_t)nominal << 16;
-  return (addend + ftcs_addend_times(addend, ftcs_addend_divide(ppm, 1000000))) >> 16;
+/* nominal (1 + ppm / 10^6), modulo 2^32: ppm in 2^-32 first, which is up to half a unit less. */
+static uint32_t beyond(uint32_t nominal, uint32_t ppm) {
+  const uint64_t part = (uint64_t)ppm * UINT32_C(2251799814) >> 19; /* 2^51 / 10^6 */
+  return nominal + (uint32_t)(ftcs_addend_product(nominal, (uint32_t)part) >> 32);
 }
 
 void ftcs_addend_start(ftcs_addend_servo* servo, const ftcs_addend_config* config,
@@ -13,11 +13,12 @@ void ftcs_addend_start(ftcs_addend_servo* servo, const ftcs_addend_config* confi
   const uint32_t nominal = config->nominal_addend;
   *servo = nothing;
   servo->config = config;
-  servo->fastest = (uint32_t)ftcs_addend_beyond(nominal, config->limit_ppm);
+  servo->fastest = beyond(nominal, config->limit_ppm);
   servo->slowest = 2U * nominal - servo->fastest;
-  servo->highest = (uint32_t)ftcs_addend_beyond(nominal, config->plausible_ppm);
+  servo->highest = beyond(nominal, config->plausible_ppm);
   servo->lowest = 2U * nominal - servo->highest;
   servo->addend = addend_now;
+  servo->correction = addend_now;
 }
 
 void ftcs_addend_reset(ftcs_addend_servo* servo) {
@@ -31,209 +32,282 @@ void ftcs_addend_reset(ftcs_addend_servo* servo) {
 
 /* ---- what the clock did ---- */
 
-int64_t ftcs_addend_tracking_time(const ftcs_addend_servo* s, int64_t local) {
-  return local + ftcs_addend_times(local < s->length ? local : s->length, s->shortening);
+int64_t ftcs_addend_bend(const ftcs_addend_servo* s, int64_t local_ns, uint16_t fraction) {
+  const int64_t rest = ftcs_addend_difference(s->until_ns, local_ns) - fraction;
+  if (rest <= 0 && ftcs_addend_timed(s->config) != 0) return 0;
+  return ftcs_addend_times(rest, (uint64_t)rest >> 30 == 0U /* 16 us: near enough */
+                                     ? s->bend
+                                     : ftcs_addend_change(s->addend, s->correction));
+}
+
+/* Local minus origin, modulo 2^64. */
+static int64_t ahead_of(const ftcs_addend_sample* in) {
+  const int32_t fraction = (int32_t)in->local_fraction - (int32_t)in->origin_fraction;
+  const uint64_t ahead_ns = (uint64_t)in->local_ns - (uint64_t)in->origin_ns;
+  return ftcs_addend_sum((int64_t)(ahead_ns << 16), fraction);
 }
 
 static void remember(ftcs_addend_servo* s, const ftcs_addend_sample* in) {
+  const uint16_t origin_fraction = in->origin_fraction;
+  const uint16_t local_fraction = in->local_fraction;
   s->origin_ns = in->origin_ns;
-  s->origin_fraction = in->origin_fraction;
   s->local_ns = in->local_ns;
-  s->local_fraction = in->local_fraction;
+  s->origin_fraction = origin_fraction;
+  s->local_fraction = local_fraction;
 }
 
 /* The history begins here: a correction that is under way goes on. */
 void ftcs_addend_prime(ftcs_addend_servo* servo, const ftcs_addend_sample* sample) {
   if (servo->phase == FTCS_EMPTY) {
-    int64_t since = ftcs_addend_difference(sample->local_ns, servo->start_ns);
-    remember(servo, sample);
+    const int64_t local_ns = sample->local_ns;
+    if (local_ns < servo->start_ns) servo->until_ns = local_ns;
+    servo->start_ns = local_ns;
     servo->phase = FTCS_PRIMED;
-    if ((uint64_t)since >= (uint64_t)servo->length) { /* or before it */
-      since = 0;
-      servo->start_ns = sample->local_ns;
-      servo->length = 0;
-    }
-    servo->before_start = -ftcs_addend_tracking_time(servo, since + sample->local_fraction);
+    remember(servo, sample);
+    servo->expected = ftcs_addend_sum(ahead_of(sample),
+                                      -ftcs_addend_bend(servo, local_ns, sample->local_fraction));
   }
 }
 
 /* ---- one sample ---- */
 
 typedef struct {
-  int64_t since;          /* from start_ns to the sample, in time at W(n) */
-  ftcs_addend_ratio rate; /* W(n+1) / W(n) - 1 */
-  int64_t wanted_q16;     /* W(n+1), not rounded, not limited */
-  int64_t interval;       /* [T_sync] */
-  uint32_t size;          /* of the offset, 1/16 ns */
+  int64_t ahead;      /* local minus origin, modulo 2^64: at the sample, later when it is written */
+  int64_t faster;     /* what the reference gained on the clock at W(n) */
+  int64_t waited;     /* from the sample to the writing: in time at W(n), later at W(n+1) */
+  int64_t time;       /* [T_sync], later [T_c] */
+  int64_t wanted_q16; /* W(n+1), not limited, not rounded */
+  uint32_t wanted;    /* rounded */
 } progress;
 
-/* Local minus reference, if the clock showed this when the sample was taken. */
-static int64_t offset_at(const ftcs_addend_sample* in, int64_t local_ns, int32_t fraction) {
-  return ftcs_addend_sum(
-      ftcs_addend_difference(local_ns, in->origin_ns) + (fraction - (int32_t)in->origin_fraction),
-      (int64_t)(0U - (uint64_t)in->path_delay_scaled));
+static int64_t rounded(int64_t addend_q16) { return (addend_q16 + 32768) >> 16; }
+
+static int32_t outside(int64_t addend, uint32_t least, uint32_t most) {
+  const uint32_t low = (uint32_t)addend;
+  return (uint32_t)((uint64_t)addend >> 32) != 0U || low < least || low > most ? 1 : 0;
 }
 
-/* The rate that tracks. Returns an enum ftcs_addend_verdict. */
-static int32_t track(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p) {
-  const int64_t reference = ftcs_addend_difference(in->origin_ns, s->origin_ns) +
-                            ((int32_t)in->origin_fraction - (int32_t)s->origin_fraction);
-  int64_t shown;
-  int64_t ahead;
-  if (in->local_ns <= s->local_ns) {
-    return reference <= 0 ? FTCS_ADDEND_DUPLICATE : FTCS_ADDEND_IMPLAUSIBLE;
+/* What the reference and the clock did since the last sample, and the clock will have done when
+ * the registers are written. Returns an enum ftcs_addend_verdict. */
+static int32_t compare(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p,
+                       int64_t* reference) {
+  *reference = ftcs_addend_difference(in->origin_ns, s->origin_ns) +
+               ((int32_t)in->origin_fraction - (int32_t)s->origin_fraction);
+  if (in->local_ns <= s->start_ns) {
+    if (in->local_ns > s->local_ns) return FTCS_ADDEND_STALE;
+    return *reference <= 0 ? FTCS_ADDEND_DUPLICATE : FTCS_ADDEND_IMPLAUSIBLE;
   }
-  if ((uint64_t)reference >= (uint64_t)FTCS_LONGEST) return FTCS_ADDEND_IMPLAUSIBLE;
-  shown = ftcs_addend_difference(in->local_ns, s->start_ns) + in->local_fraction;
-  if (shown < 0) return FTCS_ADDEND_STALE;
-  p->since = ftcs_addend_tracking_time(s, shown);
-  shown = s->before_start + p->since;
-  if (shown <= 0) return FTCS_ADDEND_IMPLAUSIBLE;
-  ahead = reference - shown;
-  if (s->config->filter != NULL && s->config->filter(s, shown, &ahead) == 0) {
-    return FTCS_ADDEND_REJECTED;
+  if ((uint64_t)*reference >= (uint64_t)FTCS_LONGEST) return FTCS_ADDEND_IMPLAUSIBLE;
+  p->waited = ftcs_addend_difference(in->now_ns, in->local_ns) - in->local_fraction;
+  p->faster = ftcs_addend_less(s->expected, p->ahead);
+  p->ahead = ftcs_addend_sum(p->ahead, p->waited);
+  if (in->local_ns < s->until_ns || ftcs_addend_timed(s->config) == 0) {
+    /* C goes on. */
+    const int64_t bend = ftcs_addend_bend(s, in->local_ns, in->local_fraction);
+    p->faster = ftcs_addend_sum(p->faster, bend);
+    p->waited += bend;
+    if (in->now_ns < s->until_ns || ftcs_addend_timed(s->config) == 0) {
+      p->waited -= ftcs_addend_bend(s, in->now_ns, 0);
+    }
   }
-  p->rate = ftcs_addend_divide(ahead, shown);
-  p->wanted_q16 = (int64_t)s->addend << 16;
-  p->wanted_q16 += ftcs_addend_times(p->wanted_q16, p->rate);
-  p->interval = ftcs_addend_interval(s, reference);
-  if (reference >> 2 > p->interval) {
-    /* What the clock gathered in an outage is an offset to be removed as at the start. */
+  return FTCS_ADDEND_USED;
+}
+
+/* [T_sync] Of the last two gaps the shorter: a missing message does not make the interval longer.
+ * What the clock gathered in an outage is an offset to be removed as at the start. */
+static int64_t interval_of(ftcs_addend_servo* s, int64_t reference) {
+  const int64_t interval = ftcs_addend_interval(s, reference);
+  if (reference >> 2 > interval) {
     s->phase = FTCS_PRIMED;
     s->inside = 0;
   }
   s->interval = reference;
-  return ftcs_addend_limited(p->wanted_q16, s->lowest, s->highest) != p->wanted_q16
-             ? FTCS_ADDEND_IMPLAUSIBLE
-             : FTCS_ADDEND_USED;
+  return interval;
+}
+
+/* The rate that tracks. Returns an enum ftcs_addend_verdict. */
+static int32_t track(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p) {
+  int64_t reference;
+  int64_t shown;
+  int64_t wanted;
+  ftcs_addend_ratio rate;
+  const int32_t verdict = compare(s, in, p, &reference);
+  if (verdict != FTCS_ADDEND_USED) return verdict;
+  shown = ftcs_addend_less(reference, p->faster);
+  if (shown <= 0 || shown > 2 * FTCS_LONGEST) return FTCS_ADDEND_IMPLAUSIBLE;
+  if (ftcs_addend_filter_of(s->config) != NULL &&
+      ftcs_addend_filter_of(s->config)(s, shown, &p->faster) == 0) {
+    return FTCS_ADDEND_REJECTED;
+  }
+  p->time = interval_of(s, reference);
+  rate = ftcs_addend_divide(p->faster, shown);
+  p->waited += ftcs_addend_times(p->waited, rate);
+  p->wanted_q16 = (int64_t)s->addend << 16;
+  p->wanted_q16 += ftcs_addend_times(p->wanted_q16, rate);
+  wanted = rounded(p->wanted_q16);
+  p->wanted = (uint32_t)wanted;
+  return outside(wanted, s->lowest, s->highest) != 0 ? FTCS_ADDEND_IMPLAUSIBLE : FTCS_ADDEND_USED;
+}
+
+/* x part / 2^16 */
+static int64_t part_of(int64_t x, uint32_t part_q16) {
+  const int32_t upper = (int32_t)(uint32_t)((uint64_t)x >> 32);
+  const int64_t whole = ftcs_addend_signed_product(upper, (int32_t)part_q16);
+  return (int64_t)(((uint64_t)whole << 16) + (ftcs_addend_product((uint32_t)x, part_q16) >> 16));
 }
 
 /* The part of the offset that this correction removes: p inside the band, with hysteresis, after
  * `dwell` offsets inside it in a row (Table 1). */
-static int64_t removed_part(ftcs_addend_servo* s, int64_t offset) {
-  const ftcs_addend_config* c = s->config;
+static int64_t part_to_remove(ftcs_addend_servo* s, const ftcs_addend_config* c, int64_t offset,
+                              uint32_t size_ns) {
   const uint32_t dwell = c->dwell > 0U ? c->dwell : 1U;
+  uint32_t inside = s->inside;
+  if (size_ns >= (inside >= dwell ? c->band_leave_ns : c->band_enter_ns)) {
+    inside = 0;
+  } else if (inside < dwell) {
+    ++inside;
+  } else {
+    /* enough */
+  }
+  s->inside = (uint16_t)inside;
+  return inside >= dwell ? part_of(offset, c->gain_q16) : offset;
+}
+
+/* Lock, deviation. */
+static void watch(ftcs_addend_servo* s, const ftcs_addend_config* c, uint32_t size) {
+  if (size >> 4 < c->lock_enter_ns) s->locked = 1;
+  if (size >> 4 >= c->lock_leave_ns) s->locked = 0;
+  if (ftcs_addend_filter_of(c) == NULL) s->deviation = ftcs_addend_average(s->deviation, size);
+}
+
+/* What of an offset is removed in T_c. The first action may step instead: in whole nanoseconds,
+ * what that leaves is removed later. */
+static int64_t removed_of(ftcs_addend_servo* s, const ftcs_addend_config* c, int64_t offset,
+                          ftcs_addend_command* out) {
+  const uint32_t size = ftcs_addend_size(offset);
+  out->step_ns = 0;
+  if (s->phase == FTCS_ACTING) {
+    watch(s, c, size);
+  } else if (ftcs_addend_steps(c) != 0 && size >> 4 >= c->step_ns) {
+    out->step_ns = ftcs_addend_less(0, out->offset_ns);
+    s->local_ns = ftcs_addend_sum(s->local_ns, out->step_ns);
+    s->expected = ftcs_addend_sum(s->expected, (int64_t)((uint64_t)out->step_ns << 16));
+    return 0;
+  } else {
+    /* all of it, but for a dwell of zero */
+  }
   if (s->phase == FTCS_ACTING || c->dwell == 0U) {
-    const uint32_t band = s->inside >= dwell ? c->band_leave_ns : c->band_enter_ns;
-    if (ftcs_addend_size(offset) >> 4 >= band) {
-      s->inside = 0;
-    } else if (s->inside < dwell) {
-      ++s->inside;
-    } else {
-      /* enough */
-    }
-    if (s->inside >= dwell) {
-      return ftcs_addend_times(offset, (int64_t)((uint64_t)c->gain_q16 << 46 | 1U));
-    }
+    return part_to_remove(s, c, offset, size >> 4);
   }
   return offset;
 }
 
-/* The first action may step: in whole nanoseconds, what that leaves is removed later. */
-static int64_t step_of(ftcs_addend_servo* s, const ftcs_addend_sample* in, uint32_t size_ns) {
-  int64_t step = 0;
-  if (s->phase != FTCS_ACTING && s->config->step_ns != 0U && size_ns >= s->config->step_ns) {
-    step = (int64_t)((uint64_t)in->origin_ns + (uint64_t)(in->path_delay_scaled >> 16) -
-                     (uint64_t)in->local_ns);
-    s->local_ns = ftcs_addend_sum(s->local_ns, step);
+static uint32_t limited(int64_t addend, uint32_t least, uint32_t most) {
+  if (addend < (int64_t)least) return least;
+  return addend > (int64_t)most ? most : (uint32_t)addend;
+}
+
+/* The tracking addend takes effect. Returns whether F limits it. */
+static int32_t follow(ftcs_addend_servo* s, const progress* p) {
+  s->addend = p->wanted;
+  s->fraction = (int16_t)(uint16_t)p->wanted_q16;
+  if (outside(p->wanted, s->slowest, s->fastest) == 0) return 0;
+  s->addend = limited(p->wanted, s->slowest, s->fastest);
+  s->fraction = 0;
+  s->expected = ftcs_addend_sum(
+      s->expected, -ftcs_addend_times(p->waited, ftcs_addend_change(s->addend, p->wanted)));
+  return 1;
+}
+
+/* C for T_c, in which the clock shows `removed` less; from start_ns on. */
+static void correct(ftcs_addend_servo* s, const progress* p, int64_t removed, int32_t limits) {
+  const int64_t bent = p->wanted_q16 - ftcs_addend_times(p->wanted_q16, s->bend);
+  const int64_t correction = rounded(bent);
+  /* What W's fraction made until start_ns. */
+  int64_t beside = -ftcs_addend_signed_product((int32_t)(p->waited >> 21), s->fraction);
+  int64_t length;
+  if (outside(correction, s->slowest, s->fastest) == 0) {
+    s->phase = FTCS_ACTING;
+    s->correction = (uint32_t)correction;
+  } else {
+    limits = 1;
+    s->correction = limited(correction, s->slowest, s->fastest);
+    removed = -ftcs_addend_times(p->time, ftcs_addend_change(s->correction, s->addend));
   }
-  return step;
-}
-
-/* What the wanted rate gains on the written one, which is half a unit of an addend away at most. */
-static int32_t gained(const ftcs_addend_servo* s, int64_t time) {
-  return (int32_t)((int64_t)(int32_t)(time >> 21) * s->fraction >> 16) /
-         (int32_t)((s->addend >> 21) + 1U);
-}
-
-/* The tracking addend takes effect. What has been waited, in time at W(n+1). */
-static void follow(ftcs_addend_servo* s, const progress* p, int64_t at_old_rate, int64_t waited) {
-  const int64_t tracking = ftcs_addend_limited(p->wanted_q16, s->slowest, s->fastest);
-  const uint32_t addend = (uint32_t)((tracking + 32768) >> 16);
-  s->fraction = (int16_t)(uint16_t)tracking;
-  s->before_start = waited - gained(s, waited);
-  if (tracking != p->wanted_q16) {
-    s->before_start =
-        at_old_rate + ftcs_addend_times(at_old_rate, ftcs_addend_change(addend, s->addend));
+  length = p->time - removed + 32768;
+  s->until_ns = ftcs_addend_sum(s->start_ns, length >> 16);
+  if (limits != 0 || s->correction - s->addend + (s->addend >> 15) > s->addend >> 14) {
+    s->bend = ftcs_addend_change(s->addend, s->correction);
+    removed = ftcs_addend_times(length & ~(int64_t)65535, s->bend);
+  } else {
+    /* Below 69 s and 30 ppm: `removed` it is, but for what both addends are rounded by. */
+    beside +=
+        ftcs_addend_signed_product((int32_t)(p->time >> 21), (int16_t)(uint16_t)bent - s->fraction);
   }
-  s->addend = addend;
+  removed += (int32_t)(beside >> 16) / (int32_t)((s->addend >> 21) + 1U);
+  s->expected = ftcs_addend_less(s->expected, removed);
 }
 
-static void steer(ftcs_addend_servo* s, const ftcs_addend_sample* in, const progress* p,
+static void steer(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p,
                   ftcs_addend_command* out) {
   const ftcs_addend_config* c = s->config;
-  /* From the sample to the moment of writing. */
-  const int64_t at_old_rate =
-      ftcs_addend_tracking_time(s, ftcs_addend_difference(in->now_ns, s->start_ns)) - p->since;
-  const int64_t waited = at_old_rate + ftcs_addend_times(at_old_rate, p->rate);
-  int64_t time = c->correction_ns != 0 ? c->correction_ns * 65536 : p->interval;
-  const int64_t least_time = time >> 1;
   int64_t removed;
-  int64_t bent;
-  int64_t correction;
-  if (c->no_timer == 0U) time -= waited;
-  if (time < least_time) time = least_time;
-  out->step_ns = step_of(s, in, p->size >> 4);
-  removed = 0;
-  if (out->step_ns == 0) {
-    removed =
-        removed_part(s, ftcs_addend_sum(offset_at(in, in->now_ns, 0), -(s->residue + waited)));
+  int32_t limits;
+  s->expected = ftcs_addend_less(p->ahead, p->waited);
+  removed = ftcs_addend_less(s->expected, in->path_delay_scaled);
+  if (FTCS_OPTIONS != 0) removed = ftcs_addend_less(removed, s->residue);
+  if (c->correction_ns != 0) p->time = c->correction_ns * 65536;
+  if (ftcs_addend_timed(c) != 0) {
+    p->time = p->waited < p->time >> 1 ? p->time - p->waited : p->time >> 1;
   }
-  follow(s, p, at_old_rate, waited);
-  bent = p->wanted_q16 - ftcs_addend_times(p->wanted_q16, ftcs_addend_divide(removed, time));
-  correction = ftcs_addend_limited(bent, s->slowest, s->fastest);
-  out->addend = (uint32_t)((correction + 32768) >> 16);
-  if (correction == bent) {
-    s->phase = FTCS_ACTING;
-  } else {
-    removed = -ftcs_addend_times(time, ftcs_addend_change(out->addend, s->addend));
-  }
-  /* In T_c the clock shows p offset less. */
-  ftcs_addend_plan(s, ftcs_addend_sum(in->now_ns, out->step_ns),
-                   (time - removed + 32768) & ~(int64_t)65535, out->addend);
-  out->until_ns = c->no_timer != 0U ? INT64_MAX : ftcs_addend_sum(s->start_ns, s->length >> 16);
+  removed = removed_of(s, c, removed, out);
+  limits = follow(s, p) | (int32_t)(p->time >> 52); /* 69 s: too long for what is near enough */
+  s->start_ns = ftcs_addend_sum(in->now_ns, out->step_ns);
+  s->bend = ftcs_addend_divide(removed, p->time);
+  correct(s, p, removed, limits);
   out->act = 1;
+  out->addend = s->correction;
+  out->until_ns = ftcs_addend_timed(c) != 0 ? s->until_ns : INT64_MAX;
 }
 
-/* Lock, deviation. */
-static void watch(ftcs_addend_servo* s, uint32_t size) {
-  const ftcs_addend_config* c = s->config;
-  if (s->phase != FTCS_ACTING) return;
-  if (size >> 4 < c->lock_enter_ns) s->locked = 1;
-  if (size >> 4 >= c->lock_leave_ns) s->locked = 0;
-  if (c->filter == NULL) s->deviation = ftcs_addend_average(s->deviation, size);
+/* Local minus reference. */
+static int64_t offset_ns_of(const ftcs_addend_sample* in) {
+  const int32_t fraction = (int32_t)in->origin_fraction - (int32_t)in->local_fraction;
+  const int64_t later = ftcs_addend_sum(in->path_delay_scaled, (int64_t)fraction + 32768) >> 16;
+  return (int64_t)((uint64_t)in->local_ns - (uint64_t)in->origin_ns - (uint64_t)later);
 }
 
 void ftcs_addend_take(ftcs_addend_servo* servo, const ftcs_addend_sample* sample,
                       ftcs_addend_command* out) {
-  const int64_t offset = offset_at(sample, sample->local_ns, sample->local_fraction);
   int32_t verdict = FTCS_ADDEND_USED;
   progress p;
-  out->offset_ns = ftcs_addend_sum(offset, 32768) >> 16;
+  p.ahead = ahead_of(sample);
+  out->offset_ns = offset_ns_of(sample);
   out->act = 0;
-  out->addend = servo->addend;
-  out->until_ns = 0;
-  out->step_ns = 0;
-  if (servo->phase == FTCS_EMPTY) {
-    ftcs_addend_prime(servo, sample);
-  } else {
+  if (servo->phase != FTCS_EMPTY) {
     verdict = track(servo, sample, &p);
+    if (verdict == FTCS_ADDEND_USED) {
+      remember(servo, sample);
+      steer(servo, sample, &p, out);
+    }
     if (verdict == FTCS_ADDEND_IMPLAUSIBLE) {
       /* Which of the two samples is wrong cannot be known: again from the newer one. */
       ftcs_addend_reset(servo);
       ftcs_addend_prime(servo, sample);
     }
-    if (verdict == FTCS_ADDEND_USED) {
-      p.size = ftcs_addend_size(offset);
-      watch(servo, p.size);
-      remember(servo, sample);
-      steer(servo, sample, &p, out);
-    }
+  } else {
+    ftcs_addend_prime(servo, sample);
+  }
+  out->state = (int32_t)FTCS_ADDEND_ACQUIRING + servo->locked;
+  if (out->act == 0) {
+    out->addend = servo->addend;
+    out->until_ns = 0;
+    out->step_ns = 0;
+    out->state = ftcs_addend_state_of(servo);
   }
   out->verdict = verdict;
   out->next_addend = servo->addend;
-  out->state = ftcs_addend_state_of(servo);
-  /* 5/4: from the mean of magnitudes to the standard deviation of a normal distribution, sqrt(pi /
-   * 2). */
+  /* 5/4: from the mean of magnitudes to the standard deviation of a normal distribution,
+   * sqrt(pi / 2). */
   out->deviation_ns = servo->deviation / 64U * 5U;
 }

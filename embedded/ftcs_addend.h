@@ -7,16 +7,20 @@
  * MAC. C99, 64-bit integers, no heap, no library, no floating point; the same bits on every
  * machine.
  *
- *   Sync received -> ftcs_addend_update() -> write command.addend -> when the clock shows
+ * Sync received -> ftcs_addend_update() -> write command.addend -> when the clock shows
  * command.until_ns, write command.next_addend. Nothing else is needed: a lost Sync does no harm.
  *
- * Rates: the clock runs at addend / nominal_addend of its oscillator. With W the addend that tracks
- * the reference, W(n+1) = W(n) d tau_r / d tau_W                        (12), (13)   d tau_W: what
- * the clock would have shown at W(n) C      = (1 - p offset / T_c) W(n+1)  for T_c, then W(n+1)
- * (17), (19); p = 1 outside the band B (18) and both limited to nominal (1 +- F). In quiet mode W
- * and the offset come from a memory that grows with the samples (expanding-memory polynomial filter
- * of degree one), up to quiet_memory samples and no further than the innovations stay white; it
- * starts as FTCS, in one interval.
+ * Rates: the clock runs at addend / nominal_addend of its oscillator. W is the addend that tracks
+ * the reference, tau_W what the clock would have shown at W(n), C the addend that corrects:
+ *
+ * W(n+1) = W(n) d tau_r / d tau_W, equations (12) and (13);
+ *
+ * C = (1 - p offset / T_c) W(n+1) for T_c, then W(n+1), equations (17) and (19);
+ *
+ * p = 1 outside the band B (18), and both limited to nominal (1 +- F). In quiet mode W and the
+ * offset come from a memory that grows with the samples (expanding-memory polynomial filter of
+ * degree one), up to quiet_memory samples and no further than the innovations stay white; it starts
+ * as FTCS, in one interval.
  *
  * Times are int64 nanoseconds, fractions and the path delay are in 2^-16 ns as IEEE 1588-2019's
  * TimeInterval (5.3.2). Offsets are local minus reference. One servo belongs to one thread; where
@@ -52,9 +56,11 @@ enum ftcs_addend_error {
   FTCS_ADDEND_BAD_GAIN = 3,  /* above 65536 */
   FTCS_ADDEND_BAD_BAND =
       4, /* band_leave_ns below band_enter_ns, or lock_leave_ns below lock_enter_ns */
-  FTCS_ADDEND_BAD_TIME = 5,   /* negative, above an hour (step_ns: 2^28 ns), or T_c longer than T */
+  FTCS_ADDEND_BAD_TIME =
+      5, /* negative, 2^41 ns (37 minutes) or more (step_ns: 2^28 ns), or T_c longer than T */
   FTCS_ADDEND_BAD_MEMORY = 6, /* a filter with a quiet_memory below 8 or above 255 */
-  FTCS_ADDEND_BAD_ADDEND = 7  /* addend_now outside nominal (1 +- F) */
+  FTCS_ADDEND_BAD_ADDEND = 7, /* addend_now outside nominal (1 +- F) */
+  FTCS_ADDEND_BAD_OPTION = 8  /* a filter, a step or no_timer, built with FTCS_ADDEND_BARE */
 };
 
 /* As band: every offset lies inside. So does it where a threshold is above 2^28 ns (0.27 s). */
@@ -107,7 +113,7 @@ typedef struct ftcs_addend_command {
       deviation_ns;  /* standard deviation of the offsets, or in quiet mode of the innovations */
   int64_t until_ns;  /* ... the clock shows this; INT64_MAX with no_timer */
   int64_t step_ns;   /* add this to the clock first; zero without config.step_ns */
-  int64_t offset_ns; /* of the sample, local minus reference, saturated at +- 2^44 ns */
+  int64_t offset_ns; /* of the sample, local minus reference */
 } ftcs_addend_command;
 
 /* A number r of magnitude at most 4 as m 2^-(29 + shift), |m| < 2^31: m in the upper half, the
@@ -117,29 +123,31 @@ typedef int64_t ftcs_addend_ratio;
 /* One servo; its content is private. */
 typedef struct ftcs_addend_servo {
   const ftcs_addend_config* config;
-  uint32_t slowest; /* addends: F */
+  uint32_t addend;     /* W(n), tracking */
+  uint32_t correction; /* C(n) */
+  uint32_t slowest;    /* addends: F */
   uint32_t fastest;
   uint32_t lowest; /* addends: plausible */
   uint32_t highest;
+  int32_t fraction;   /* wanted minus written tracking addend, 2^-16 */
+  uint32_t deviation; /* mean of magnitudes, 1/16 ns */
+  uint16_t phase;
+  uint16_t locked;
+  uint16_t inside; /* offsets below band_enter_ns in a row */
+  uint16_t memory; /* samples the filter remembers */
+  uint16_t origin_fraction;
+  uint16_t local_fraction;
+  int16_t whiteness; /* mean product of the signs of successive innovations, 256 is 1 */
+  uint16_t last;     /* innovation: its sign, and whether it was doubted */
   int64_t origin_ns; /* of the last sample */
   int64_t local_ns;
   int64_t interval; /* between the last two samples, 2^-16 ns; zero: there were none */
-  int64_t start_ns; /* the clock showed this when the correction began; 2^-16 ns from here on: */
-  int64_t length;   /* what it shows until the correction ends */
-  int64_t before_start;         /* from the last sample to start_ns, at the rate of W(n) */
-  ftcs_addend_ratio shortening; /* (W - C) / C: a time shown at C, in time at W */
-  int64_t residue;              /* filtered minus measured reference of the last sample */
-  uint32_t addend;              /* W(n), tracking */
-  int32_t fraction;             /* wanted minus written tracking addend, 2^-16 */
-  uint32_t deviation;           /* mean of magnitudes, 1/16 ns */
-  uint16_t origin_fraction;
-  uint16_t local_fraction;
-  uint16_t inside;   /* offsets below band_enter_ns in a row */
-  uint16_t memory;   /* samples the filter remembers */
-  int16_t whiteness; /* mean product of the signs of successive innovations, 256 is 1 */
-  uint8_t phase;
-  uint8_t locked;
-  uint8_t last; /* innovation: its sign, and whether it was doubted */
+  int64_t start_ns; /* the correction began when the clock showed this, ... */
+  int64_t until_ns; /* ... and ends when it shows this */
+  int64_t expected; /* local minus origin from then on, if the oscillator stays as it is: 2^-16 ns,
+                       modulo 2^64 */
+  ftcs_addend_ratio bend; /* W / C - 1 */
+  int64_t residue;        /* filtered minus measured reference of the last sample */
 } ftcs_addend_servo;
 
 /* FTCS with the defaults of the C++ servo: p = 1/16, B unbounded, F and plausible rates +- 50 % or

@@ -23,14 +23,8 @@ ftcs_addend_config ftcs_addend_default_config(uint32_t nominal_addend) {
   return c;
 }
 
-static int32_t time_error(const ftcs_addend_config* c) {
-  const uint64_t hour = UINT64_C(3600000000000);
-  const uint64_t longest = c->interval_ns > 0 ? (uint64_t)c->interval_ns : hour;
-  return (uint64_t)c->interval_ns > hour || (uint64_t)c->correction_ns > longest ||
-                 c->step_ns >= UINT32_C(1) << 28
-             ? FTCS_ADDEND_BAD_TIME
-             : FTCS_ADDEND_OK;
-}
+/* 37 minutes, or negative. */
+static int32_t too_long(int64_t time_ns) { return (uint64_t)time_ns >> 41 != 0U ? 1 : 0; }
 
 static int32_t config_error(const ftcs_addend_config* c) {
   if (c->limit_ppm - 1U >= 500000U || c->plausible_ppm - 1U >= 500000U) {
@@ -40,8 +34,17 @@ static int32_t config_error(const ftcs_addend_config* c) {
   if (c->band_leave_ns < c->band_enter_ns || c->lock_leave_ns < c->lock_enter_ns) {
     return FTCS_ADDEND_BAD_BAND;
   }
+  if (too_long(c->interval_ns | c->correction_ns) != 0 || c->step_ns >> 28 != 0U ||
+      (c->interval_ns != 0 && c->correction_ns > c->interval_ns)) {
+    return FTCS_ADDEND_BAD_TIME;
+  }
+#if FTCS_OPTIONS
   if (c->filter != NULL && c->quiet_memory - 8U > 247U) return FTCS_ADDEND_BAD_MEMORY;
-  return time_error(c);
+  return FTCS_ADDEND_OK;
+#else
+  return c->filter != NULL || (c->step_ns | c->no_timer) != 0U ? FTCS_ADDEND_BAD_OPTION
+                                                               : FTCS_ADDEND_OK;
+#endif
 }
 
 int32_t ftcs_addend_init(ftcs_addend_servo* servo, const ftcs_addend_config* config,
@@ -49,19 +52,33 @@ int32_t ftcs_addend_init(ftcs_addend_servo* servo, const ftcs_addend_config* con
   const int32_t error = config_error(config);
   const uint32_t nominal = config->nominal_addend;
   if (error != FTCS_ADDEND_OK) return error;
-  if (nominal == 0U || ((ftcs_addend_beyond(nominal, config->limit_ppm) |
-                         ftcs_addend_beyond(nominal, config->plausible_ppm)) >>
-                        32) != 0) {
+  ftcs_addend_start(servo, config, addend_now);
+  /* A limit that does not fit 32 bits has wrapped. */
+  if (nominal == 0U || servo->fastest < nominal || servo->highest < nominal) {
     return FTCS_ADDEND_BAD_NOMINAL;
   }
-  ftcs_addend_start(servo, config, addend_now);
   return addend_now < servo->slowest || addend_now > servo->fastest ? FTCS_ADDEND_BAD_ADDEND
                                                                     : FTCS_ADDEND_OK;
 }
 
 /* In units of addends, as everything that a register can hold is limited by F. */
-static uint32_t limited(const ftcs_addend_servo* s, uint32_t addend) {
+static uint32_t cut(const ftcs_addend_servo* s, uint32_t addend) {
   return addend < s->slowest ? s->slowest : (addend > s->fastest ? s->fastest : addend);
+}
+
+/* At W, from the last sample to a reading. */
+int64_t ftcs_addend_elapsed(const ftcs_addend_servo* servo, int64_t local_ns) {
+  int64_t since = ftcs_addend_difference(local_ns, servo->local_ns) - servo->local_fraction;
+  if (local_ns >= servo->start_ns) {
+    /* Local minus origin as it was, less what it will be if the oscillator stays as it is. */
+    const int32_t fraction = (int32_t)servo->local_fraction - (int32_t)servo->origin_fraction;
+    const uint64_t ahead_ns = (uint64_t)servo->local_ns - (uint64_t)servo->origin_ns;
+    const int64_t gained = ftcs_addend_sum((int64_t)(ahead_ns << 16), fraction);
+    since = ftcs_addend_sum(since, gained);
+    since = ftcs_addend_less(since, servo->expected);
+    since = ftcs_addend_less(since, ftcs_addend_bend(servo, local_ns, 0));
+  }
+  return since;
 }
 
 void ftcs_addend_wrote(ftcs_addend_servo* servo, int64_t at_ns, uint32_t addend,
@@ -72,37 +89,45 @@ void ftcs_addend_wrote(ftcs_addend_servo* servo, int64_t at_ns, uint32_t addend,
         ftcs_addend_difference(servo->start_ns, servo->local_ns) - servo->local_fraction;
     const int64_t late = ftcs_addend_clamp(ftcs_addend_difference(at_ns, servo->start_ns),
                                            -(planned >> 1), FTCS_LONGEST_LATENCY);
-    int64_t before = servo->before_start + late;
-    /* The clock went on as it had from the sample to start_ns, near enough. */
+    int64_t before = ftcs_addend_elapsed(servo, servo->start_ns);
+    /* What the clock showed until then, and a constant. */
+    int64_t shown = ftcs_addend_sum(servo->expected, before);
+    shown = ftcs_addend_sum(shown, ftcs_addend_bend(servo, servo->start_ns, 0) + late);
+    /* It went on as it had from the sample to start_ns, near enough. */
     if (planned > 0) {
-      before += ftcs_addend_times(late, ftcs_addend_divide(servo->before_start - planned, planned));
+      const ftcs_addend_ratio faster =
+          ftcs_addend_divide(ftcs_addend_less(before, planned), planned);
+      before = ftcs_addend_sum(before, ftcs_addend_times(late, faster));
     }
-    servo->addend = limited(servo, next_addend);
+    before = ftcs_addend_sum(before, late);
+    servo->addend = cut(servo, next_addend);
     servo->fraction = (int32_t)ftcs_addend_clamp(
         servo->fraction + ((int64_t)was - (int64_t)servo->addend) * 65536, -INT32_MAX, INT32_MAX);
-    before += ftcs_addend_times(before, ftcs_addend_change(servo->addend, was));
-    servo->before_start = ftcs_addend_clamp(before, -FTCS_LONGEST, FTCS_LONGEST);
-    ftcs_addend_plan(servo, ftcs_addend_sum(servo->start_ns, late >> 16),
-                     servo->length > late ? servo->length - late : 0, limited(servo, addend));
+    before =
+        ftcs_addend_sum(before, ftcs_addend_times(before, ftcs_addend_change(servo->addend, was)));
+    servo->correction = cut(servo, addend);
+    servo->bend = ftcs_addend_change(servo->addend, servo->correction);
+    servo->start_ns = ftcs_addend_sum(servo->start_ns, late >> 16);
+    if (servo->start_ns >= servo->until_ns) servo->phase = FTCS_PRIMED; /* it was never made */
+    shown = ftcs_addend_less(shown, ftcs_addend_bend(servo, servo->start_ns, 0));
+    servo->expected = ftcs_addend_less(shown, before);
   }
 }
 
 void ftcs_addend_wrote_next(ftcs_addend_servo* servo, int64_t at_ns) {
-  if (servo->config->no_timer == 0U) {
-    servo->length =
-        ftcs_addend_clamp(ftcs_addend_difference(at_ns, servo->start_ns), 0, FTCS_LONGEST);
+  if (ftcs_addend_timed(servo->config) != 0) {
+    const int64_t late = ftcs_addend_difference(at_ns, servo->until_ns);
+    const ftcs_addend_ratio bend = ftcs_addend_change(servo->addend, servo->correction);
+    servo->expected = ftcs_addend_less(servo->expected, ftcs_addend_times(late, bend));
+    servo->until_ns = at_ns;
   }
 }
 
 void ftcs_addend_stepped(ftcs_addend_servo* servo, int64_t by_ns) {
   servo->local_ns = ftcs_addend_sum(servo->local_ns, by_ns);
   servo->start_ns = ftcs_addend_sum(servo->start_ns, by_ns);
-}
-
-int64_t ftcs_addend_elapsed(const ftcs_addend_servo* servo, int64_t local_ns) {
-  const int64_t since = ftcs_addend_difference(local_ns, servo->start_ns);
-  if (since >= 0) return servo->before_start + ftcs_addend_tracking_time(servo, since);
-  return ftcs_addend_difference(local_ns, servo->local_ns) - servo->local_fraction;
+  servo->until_ns = ftcs_addend_sum(servo->until_ns, by_ns);
+  servo->expected = ftcs_addend_sum(servo->expected, (int64_t)((uint64_t)by_ns << 16));
 }
 
 int32_t ftcs_addend_state_at(const ftcs_addend_servo* servo, int64_t now_ns) {

@@ -1,6 +1,26 @@
 /* SPDX-License-Identifier: MIT */
 #include "ftcs_addend_private.h"
 
+#if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
+uint64_t ftcs_addend_product(uint32_t a, uint32_t b) {
+  const uint32_t low = (a & 0xFFFFU) * (b & 0xFFFFU);
+  const uint32_t cross = (a >> 16) * (b & 0xFFFFU) + (low >> 16);
+  const uint32_t other = (a & 0xFFFFU) * (b >> 16) + (cross & 0xFFFFU);
+  const uint32_t high = (a >> 16) * (b >> 16) + (cross >> 16) + (other >> 16);
+  return ((uint64_t)high << 32) | (other << 16) | (low & 0xFFFFU);
+}
+
+int64_t ftcs_addend_signed_product(int32_t a, int32_t b) {
+  const uint32_t below = ((uint32_t)a & (uint32_t)(b >> 31)) + ((uint32_t)b & (uint32_t)(a >> 31));
+  return (int64_t)(ftcs_addend_product((uint32_t)a, (uint32_t)b) - ((uint64_t)below << 32));
+}
+
+int64_t ftcs_addend_mixed_upper(uint32_t a, int32_t b) {
+  const uint32_t upper = (uint32_t)(ftcs_addend_product(a, (uint32_t)b) >> 32);
+  return (int64_t)upper - (int64_t)(a & (uint32_t)(b >> 31));
+}
+#endif
+
 /* Leading zeros of a number that is not zero. */
 static uint32_t leading_zeros(uint32_t x) {
 #if defined(__GNUC__) && !defined(FTCS_ADDEND_PORTABLE)
@@ -17,19 +37,19 @@ static uint32_t leading_zeros(uint32_t x) {
 
 /* The 32 highest bits of a number that is not zero in the upper half; in the lower, how
  * far it was shifted to the left for that. */
-static uint64_t highest_bits(uint64_t x) {
+static FTCS_INLINE uint64_t highest_bits(uint64_t x) {
   uint32_t upper = (uint32_t)(x >> 32);
   uint32_t lower = (uint32_t)x;
-  uint32_t shift = 0;
   uint32_t zeros;
-  if (upper == 0U) {
-    upper = lower;
-    lower = 0;
-    shift = 32;
+  if (upper != 0U) {
+    zeros = leading_zeros(upper);
+    upper = (upper << zeros) | ((lower >> 1) >> (31U - zeros));
+  } else {
+    zeros = leading_zeros(lower);
+    upper = lower << zeros;
+    zeros += 32U;
   }
-  zeros = leading_zeros(upper);
-  upper = (upper << zeros) | ((lower >> 1) >> (31U - zeros));
-  return ((uint64_t)upper << 32) | (shift + zeros);
+  return ((uint64_t)upper << 32) | zeros;
 }
 
 /* 2^63 / d for d >= 2^31, less than one too small: a quotient of 16 bits and the terms e and e^2 of
@@ -73,16 +93,15 @@ ftcs_addend_ratio ftcs_addend_change(uint32_t to, uint32_t from) {
   return ftcs_addend_divide((int64_t)to - (int64_t)from, from);
 }
 
-/* x = upper 2^28 + lower 2^-3, so that all products are of signed words. */
+/* The upper 64 bits of 96, times 8: three bits less than there could be where r is 1/2 or more. */
 int64_t ftcs_addend_times(int64_t x, ftcs_addend_ratio r) {
   const int32_t mantissa = (int32_t)(uint32_t)((uint64_t)r >> 32);
   const uint32_t shift = (uint32_t)r;
-  const int32_t upper = (int32_t)(uint32_t)((uint64_t)x >> 28);
-  const int32_t lower = (int32_t)(((uint32_t)x << 4) >> 1);
-  const int64_t product = (ftcs_addend_signed_product(upper, mantissa) >> 1) +
-                          (ftcs_addend_signed_product(lower, mantissa) >> 32);
-  const int32_t high = (int32_t)(uint32_t)((uint64_t)product >> 32);
-  const uint32_t low = (uint32_t)product >> shift | ((uint32_t)high << 1) << (31U - shift);
+  const uint64_t product =
+      (uint64_t)ftcs_addend_signed_product((int32_t)(uint32_t)((uint64_t)x >> 32), mantissa) +
+      (uint64_t)ftcs_addend_mixed_upper((uint32_t)x, mantissa);
+  const int32_t high = (int32_t)(uint32_t)(product >> 29);
+  const uint32_t low = ((uint32_t)product << 3) >> shift | ((uint32_t)high << 1) << (31U - shift);
   return (int64_t)((uint64_t)(uint32_t)(high >> shift) << 32 | low);
 }
 
@@ -97,8 +116,4 @@ int64_t ftcs_addend_difference(int64_t a_ns, int64_t b_ns) {
     d = d < 0 ? -FTCS_LONGEST_NS : FTCS_LONGEST_NS;
   }
   return d * 65536;
-}
-
-int64_t ftcs_addend_limited(int64_t addend_q16, uint32_t least, uint32_t most) {
-  return ftcs_addend_clamp(addend_q16, (int64_t)least << 16, (int64_t)most << 16);
 }

@@ -16,30 +16,44 @@
 
 typedef char ftcs_addend_shifts_signed[(-3 >> 1) == -2 ? 1 : -1];
 
+#if defined(__GNUC__) && !defined(__ARM_ARCH_6M__)
+#define FTCS_INLINE inline __attribute__((always_inline)) /* where -Os would not */
+#else
+#define FTCS_INLINE inline
+#endif
+
+/* FTCS alone, where every byte counts: no filter, no step, and somebody writes next_addend. */
+#if defined(FTCS_ADDEND_BARE)
+#define FTCS_OPTIONS 0
+#else
+#define FTCS_OPTIONS 1
+#endif
+
+static inline int32_t ftcs_addend_timed(const ftcs_addend_config* c) {
+  return FTCS_OPTIONS == 0 || c->no_timer == 0U ? 1 : 0;
+}
+static inline int32_t ftcs_addend_steps(const ftcs_addend_config* c) {
+  return FTCS_OPTIONS != 0 && c->step_ns != 0U ? 1 : 0;
+}
+static inline ftcs_addend_filter ftcs_addend_filter_of(const ftcs_addend_config* c) {
+  return FTCS_OPTIONS != 0 ? c->filter : NULL;
+}
+
 enum { FTCS_EMPTY = 0, FTCS_PRIMED = 1, FTCS_ACTING = 2 };
 
-/* a b. A processor that multiplies words to a word alone (Cortex-M0+) is served by four products of
- * halves. */
-static inline uint64_t ftcs_addend_product(uint32_t a, uint32_t b) {
+/* a b; the same, signed; and a b / 2^32, towards minus infinity. A processor that multiplies words
+ * to a word alone (Cortex-M0+) is served by four products of halves. */
 #if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
-  const uint32_t low = (a & 0xFFFFU) * (b & 0xFFFFU);
-  const uint32_t cross = (a >> 16) * (b & 0xFFFFU) + (low >> 16);
-  const uint32_t other = (a & 0xFFFFU) * (b >> 16) + (cross & 0xFFFFU);
-  const uint32_t high = (a >> 16) * (b >> 16) + (cross >> 16) + (other >> 16);
-  return ((uint64_t)high << 32) | (other << 16) | (low & 0xFFFFU);
+uint64_t ftcs_addend_product(uint32_t a, uint32_t b);
+int64_t ftcs_addend_signed_product(int32_t a, int32_t b);
+int64_t ftcs_addend_mixed_upper(uint32_t a, int32_t b);
 #else
-  return (uint64_t)a * b;
-#endif
+static inline uint64_t ftcs_addend_product(uint32_t a, uint32_t b) { return (uint64_t)a * b; }
+static inline int64_t ftcs_addend_signed_product(int32_t a, int32_t b) { return (int64_t)a * b; }
+static inline int64_t ftcs_addend_mixed_upper(uint32_t a, int32_t b) {
+  return (int64_t)a * b >> 32;
 }
-
-static inline int64_t ftcs_addend_signed_product(int32_t a, int32_t b) {
-#if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
-  const uint32_t below = ((uint32_t)a & (uint32_t)(b >> 31)) + ((uint32_t)b & (uint32_t)(a >> 31));
-  return (int64_t)(ftcs_addend_product((uint32_t)a, (uint32_t)b) - ((uint64_t)below << 32));
-#else
-  return (int64_t)a * b;
 #endif
-}
 
 /* n / d to 30 bits, d > 0, both below 2^62 in magnitude; at most 4. */
 ftcs_addend_ratio ftcs_addend_divide(int64_t n, int64_t d);
@@ -61,31 +75,22 @@ static inline int64_t ftcs_addend_sum(int64_t a, int64_t b) {
   return (int64_t)((uint64_t)a + (uint64_t)b);
 }
 
+static inline int64_t ftcs_addend_less(int64_t a, int64_t b) {
+  return (int64_t)((uint64_t)a - (uint64_t)b);
+}
+
 static inline int64_t ftcs_addend_clamp(int64_t x, int64_t low, int64_t high) {
   return x < low ? low : (x > high ? high : x);
 }
-
-/* An addend in 2^-16, cut at two whole ones. */
-int64_t ftcs_addend_limited(int64_t addend_q16, uint32_t least, uint32_t most);
 
 /* The mean of the sizes, one more. */
 static inline uint32_t ftcs_addend_average(uint32_t mean, uint32_t size) {
   return mean == 0U ? size : mean - mean / 8U + size / 8U;
 }
 
-/* What the clock would have shown at W while it showed `local` since start_ns. */
-int64_t ftcs_addend_tracking_time(const ftcs_addend_servo* servo, int64_t local);
-
-/* nominal (1 + ppm / 10^6) */
-int64_t ftcs_addend_beyond(uint32_t nominal, uint32_t ppm);
-
-/* The correction that begins at start_ns. */
-static inline void ftcs_addend_plan(ftcs_addend_servo* s, int64_t start_ns, int64_t length,
-                                    uint32_t correction) {
-  s->start_ns = start_ns;
-  s->length = s->config->no_timer != 0U ? FTCS_LONGEST : length;
-  s->shortening = ftcs_addend_change(s->addend, correction);
-}
+/* What the correction under way makes from a reading until it ends: what the clock would show at W
+ * more than at C. */
+int64_t ftcs_addend_bend(const ftcs_addend_servo* s, int64_t local_ns, uint16_t fraction);
 
 /* [T_sync] Of the last two gaps the shorter: a missing message does not make the interval longer.
  */

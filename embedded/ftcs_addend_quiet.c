@@ -17,7 +17,7 @@ ftcs_addend_config ftcs_addend_quiet_config(uint32_t nominal_addend) {
  * tell it whatever the noise. Half of it is dropped then, and one sample added while they are
  * white. (Measured: docs/embedded.md, quiet mode.) */
 static void adapt_memory(ftcs_addend_servo* s, int64_t innovation) {
-  const uint8_t sign = innovation < 0 ? FTCS_NEGATIVE : FTCS_POSITIVE;
+  const uint16_t sign = innovation < 0 ? FTCS_NEGATIVE : FTCS_POSITIVE;
   const int32_t same = (s->last & FTCS_SIGN) == sign ? 256 : -256;
   if ((s->last & FTCS_SIGN) != 0U) {
     s->whiteness = (int16_t)(s->whiteness + (same - s->whiteness) / 24);

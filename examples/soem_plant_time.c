@@ -88,6 +88,14 @@ static uint16 all_states(void) {
   return etohs(status);
 }
 
+/* Who left OP, perhaps after a stall of the host, has its error acknowledged and is asked again the next time. */
+static void bring_back(uint16 states) {
+  if (states == EC_STATE_OPERATIONAL) return;
+  context.slavelist[0].state =
+      (states & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
+  ecx_writestate(&context, 0);
+}
+
 /* Writes 0x0920 of the reference; what is in force from now on. */
 static int64_t move_bus(int64_t wanted, int64_t in_force) {
   int64 offset = htoell(base_offset + wanted);
@@ -152,6 +160,7 @@ static int run(double seconds) {
       context.slavelist[0].state = EC_STATE_OPERATIONAL;
       ecx_writestate(&context, 0);
     }
+    if (asked && cycle % 100 == 0) bring_back(all_states());
   }
   {
     const int in_op = all_states() == EC_STATE_OPERATIONAL;

@@ -107,7 +107,7 @@ void add_analyse_command(CLI::App& app, int& exit_code) {
       "analyse", "Stability figures and plots of a phase, frequency or offset record");
   command
       ->add_option("FILE", options->file,
-                   "text, CSV, log of ptp4l or phc2sys, also gzip; - = standard input")
+                   "text, CSV, log of ptp4l, phc2sys or chrony, also gzip; - = standard input")
       ->required();
   command->add_option("--column", options->series.column, "values: number from 1, or heading");
   command->add_option("--time-column", options->series.time_column,

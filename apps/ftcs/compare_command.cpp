@@ -56,7 +56,7 @@ int compare_log(const CompareOptions& options) {
   const auto libraries = load_servos(names);
   if (!knows_servos(names)) return kUsageError;
   if (!can_write_results({files.json, files.csv, files.html, files.trace})) return kRuntimeError;
-  auto log = experiment::read_recorded_log(options.log, options.source);
+  auto log = read_recorded_log(options.log, options.source);
   if (!log) {
     fmt::print(stderr, "ftcs: {}\n", log.error().text());
     return kRuntimeError;
@@ -64,6 +64,7 @@ int compare_log(const CompareOptions& options) {
   LogComparison comparison{options.log, std::move(*log), {}};
   comparison.servos = experiment::replay_log(comparison.log, names, libraries);
   if (!options.sweep.quiet) fmt::print("{}", log_console(comparison));
+  say_doubts(libraries);
   bool written =
       files.json.empty() || write_result(files.json, dump(log_json(comparison, FTCS_VERSION)));
   written &= files.csv.empty() || write_result(files.csv, log_table(comparison).to_csv());

@@ -67,6 +67,8 @@ std::optional<std::string> read_line(std::string_view line, bool& in_section,
 
 std::optional<std::string> read_config_text(std::string_view text, std::string_view name,
                                             daemon::PtpOptions& options) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // UTF-8, as some editors begin
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   bool in_section = false;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');

@@ -96,6 +96,10 @@ TEST(ConfigFile, settings_without_effect_are_accepted_only_with_the_value_that_i
             "ptp.conf:2: clock_type: 'BC' is not supported, only OC");
 }
 
+TEST(ConfigFile, a_byte_order_mark_is_no_setting) {
+  EXPECT_EQ(error_of("\xEF\xBB\xBF[global]\ndomainNumber 3\n"), "");
+}
+
 TEST(ConfigFile, every_error_names_file_line_and_setting) {
   EXPECT_EQ(error_of("[global]\n\n#\ncolour blue\n"), "ptp.conf:4: unknown setting 'colour'");
   EXPECT_EQ(error_of("[global]\ndomainNumber\n"), "ptp.conf:2: 'domainNumber' has no value");

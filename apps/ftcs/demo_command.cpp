@@ -10,8 +10,8 @@
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/units.h"
-#include "ftcs/daemon/demo_report.h"
 #include "ftcs/daemon/ptp_transmitter.h"
+#include "ftcs/fieldbus/demo_report.h"
 
 namespace ftcs::app {
 namespace {

@@ -9,7 +9,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/suggestion.h"
+#include "ftcs/report/suggestion.h"
 
 namespace {
 
@@ -18,7 +18,7 @@ std::string command_for(const std::string& name, const std::vector<std::string>&
   if (name == "ptp4l") return "ptp";
   if (name == "phc2sys") return "phc";
   if (name == "pmc") return "status";
-  return ftcs::app::suggestion(name, commands);
+  return ftcs::suggestion(name, commands);
 }
 
 /// What is left of the command line once everything that is known was taken from it.
@@ -35,7 +35,7 @@ std::string unexpected(const CLI::App& app) {
   }
   const std::string name = option->substr(0, option->find('='));
   return fmt::format("unknown option '{}'{}", name,
-                     ftcs::app::did_you_mean(ftcs::app::suggestion(name, names)));
+                     ftcs::did_you_mean(ftcs::suggestion(name, names)));
 }
 
 int run(int argc, char** argv) {
@@ -62,7 +62,7 @@ int run(int argc, char** argv) {
       argc > 1 && std::find(commands.begin(), commands.end(), argv[1]) != commands.end();
   if (argc > 1 && argv[1][0] != '-' && !has_command) {
     fmt::print(stderr, "ftcs: unknown command '{}'{} (see ftcs --help)\n", argv[1],
-               did_you_mean(command_for(argv[1], commands)));
+               ftcs::did_you_mean(command_for(argv[1], commands)));
     return kUsageError;
   }
   try {

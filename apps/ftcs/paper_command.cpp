@@ -10,11 +10,11 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/experiment_files.h"
-#include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/progress.h"
 #include "apps/ftcs/sweep_options.h"
-#include "ftcs/daemon/ethercat/contour_live.h"
+#include "ftcs/fieldbus/contour_live.h"
+#include "ftcs/platform/interrupt.h"
 #include "ftcs/report/cycle_report.h"
 #include "ftcs/report/paper_report.h"
 
@@ -56,7 +56,7 @@ int reproduce(const PaperOptions& options) {
                names.front());
     return kUsageError;
   }
-  const Interrupt interrupt;
+  const platform::Interrupt interrupt;
   std::vector<experiment::PaperResult> results;
   if (!options.quiet) fmt::print("{}\n", algorithm_text());
   for (auto& table : load_tables(options)) {
@@ -70,6 +70,7 @@ int reproduce(const PaperOptions& options) {
     results.push_back(experiment::run_paper_table(table, control));
     if (!options.quiet) fmt::print("{}\n", paper_console(results.back()));
   }
+  say_doubts(libraries);
   const bool passed = !interrupt.flag() && std::all_of(results.begin(), results.end(),
                                                        [](const auto& r) { return r.passed(); });
   if (interrupt.flag())
@@ -89,7 +90,7 @@ constexpr std::uint64_t kSection5Seeds = 1024;
 
 /// Section V: the cycle servo on a coarse timer, in simulated time.
 int reproduce_section5(const PaperOptions& options) {
-  const Interrupt interrupt;
+  const platform::Interrupt interrupt;
   Progress progress;
   experiment::JobControl control;
   control.threads = options.threads;

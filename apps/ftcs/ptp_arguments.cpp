@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/number_check.h"
+#include "apps/ftcs/ptp_fixed_settings.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_presets.h"
 

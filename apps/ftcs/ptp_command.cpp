@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -14,6 +15,7 @@
 #include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/ptp_port.h"
+#include "ftcs/daemon/rights.h"
 #include "ftcs/platform/network_interface.h"
 
 namespace ftcs::app {
@@ -116,6 +118,23 @@ Wrong apply_peer(const PtpArguments& arguments, daemon::PtpOptions& options) {
   return fmt::format("--unicast: '{}' is not {} address", arguments.unicast, kind);
 }
 
+/// The keys are read here, while every right to read them is still there.
+Wrong apply_authentication(daemon::PtpOptions& options) {
+  const daemon::SecurityOptions& wanted = options.authentication;
+  if (!wanted.spp) {
+    if (wanted.active_key_id != 0) return "active_key_id needs spp";
+    return std::nullopt;  // as for ptp4l: a file that no port names
+  }
+  if (wanted.sa_file.empty()) return "spp needs sa_file";
+  if (wanted.active_key_id == 0) return "spp needs active_key_id, 1 or more";
+  if (options.minor_version == 0)
+    return "spp needs ptp_minor_version 1: IEEE 1588-2008 has no such TLV";
+  if (options.source == daemon::Source::kPtp4l)
+    return "spp: with --source ptp4l it is ptp4l that authenticates";
+  options.security = std::make_shared<daemon::Security>(wanted);
+  return options.security->load();
+}
+
 Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
   // Who only receives time by multicast is asked nothing: messages to its own address come from
   // whoever can route a packet here.
@@ -131,7 +150,7 @@ Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
     if (!options.acceptable.add(*identity)) return "--acceptable-transmitter: more than 16 clocks";
   }
   if (arguments.no_fast_start) options.fast_start = false;
-  return std::nullopt;
+  return apply_authentication(options);
 }
 
 Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) {
@@ -245,7 +264,8 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
     if (!options.uds_address_given) {
       options.uds_address = platform::writable_socket_path(daemon::kSocketName);
     }
-    if (const auto wrong = confine_to(rights_of(options), arguments->rights, &options.once_open)) {
+    if (const auto wrong =
+            confine_to(daemon::rights_of(options), arguments->rights, &options.once_open)) {
       fmt::print(stderr, "ftcs ptp: {}\n", *wrong);
       exit_code = kRuntimeError;
       return;

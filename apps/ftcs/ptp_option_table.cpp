@@ -10,9 +10,10 @@
 
 #include <fmt/core.h>
 
+#include "apps/ftcs/ptp_fixed_settings.h"
 #include "apps/ftcs/steering_arguments.h"
-#include "apps/ftcs/suggestion.h"
 #include "apps/ftcs/units.h"
+#include "ftcs/report/suggestion.h"
 
 namespace ftcs::app {
 namespace {
@@ -167,6 +168,14 @@ Wrong set_timeout(daemon::PtpOptions& options, std::string_view text) {
   return std::nullopt;
 }
 
+Wrong set_spp(daemon::PtpOptions& options, std::string_view text) {
+  int spp = 0;
+  if (auto wrong = integer(text, spp, -1, 255)) return wrong;
+  options.authentication.spp.reset();
+  if (spp >= 0) options.authentication.spp = static_cast<std::uint8_t>(spp);
+  return std::nullopt;
+}
+
 Wrong set_uds_address(daemon::PtpOptions& options, std::string_view text) {
   options.uds_address = text == "none" ? "" : text;
   options.uds_address_given = true;
@@ -296,64 +305,17 @@ constexpr std::array kSettings{
     PtpSetting{"slave_event_monitor",
                "with --source ptp4l: ptp4l's setting of that name; default /var/run/ftcs-monitor",
                FTCS_SET((o.monitor_socket = v, Wrong{}))},
+    PtpSetting{"sa_file", "file of keys: messages are authenticated (IEEE 1588-2019, 16.14)",
+               FTCS_SET((o.authentication.sa_file = v, Wrong{}))},
+    PtpSetting{"spp", "which association of sa_file, 0 to 255; -1: none", set_spp},
+    PtpSetting{"active_key_id", "key of what is sent, 1 to 4294967295",
+               FTCS_SET(integer(v, o.authentication.active_key_id, 0, 4'294'967'295))},
     PtpSetting{"logging_level", "0 to 7", FTCS_SET(integer(v, o.log_level, 0, 7))},
     PtpSetting{"summary_interval", "log2 of seconds, -7 to 20",
                FTCS_SET(integer(v, o.summary_interval, -7, 20))},
 };
 
 #undef FTCS_SET
-
-// What describes this program anyway, so that files written for ptp4l need no editing; kAny: no
-// effect here.
-struct Fixed {
-  const char* name;
-  const char* value;
-};
-constexpr const char* kAny = "*";
-constexpr std::array kFixed{
-    Fixed{"twoStepFlag", "1"},
-    Fixed{"gmCapable", "1"},
-    Fixed{"socket_priority", "0"},
-    Fixed{"freq_est_interval", kAny},  // free_running has no estimator of its own
-    Fixed{"dscp_event", "0"},
-    Fixed{"dscp_general", "0"},
-    Fixed{"dataset_comparison", "ieee1588"},
-    Fixed{"G.8275.defaultDS.localPriority", "128"},
-    Fixed{"G.8275.portDS.localPriority", "128"},
-    Fixed{"maxStepsRemoved", "255"},
-    Fixed{"operLogSyncInterval", kAny},       // automotive profile only
-    Fixed{"operLogPdelayReqInterval", kAny},  // automotive profile only
-    Fixed{"fault_reset_interval", kAny},      // the port comes back by itself
-    Fixed{"BMCA", "ptp"},
-    Fixed{"inhibit_announce", "0"},
-    Fixed{"inhibit_delay_req", "0"},
-    Fixed{"ignore_source_id", "0"},
-    Fixed{"ignore_transport_specific", "0"},
-    Fixed{"inhibit_multicast_service", "0"},
-    Fixed{"net_sync_monitor", "0"},
-    Fixed{"tc_spanning_tree", "0"},
-    Fixed{"unicast_listen", "0"},
-    Fixed{"unicast_master_table", "0"},
-    Fixed{"unicast_req_duration", kAny},  // unicast negotiation only
-    Fixed{"use_syslog", kAny},            // messages go to standard output
-    Fixed{"verbose", kAny},
-    Fixed{"check_fup_sync", "0"},
-    Fixed{"sanity_freq_limit", kAny},  // RAW is the estimator's clock: nothing to check against
-    Fixed{"ntpshm_segment", "0"},
-    Fixed{"msg_interval_request", "0"},
-    Fixed{"servo_num_offset_values", kAny},  // of servo_offset_threshold only
-    Fixed{"servo_offset_threshold", "0"},
-    Fixed{"write_phase_mode", "0"},
-    Fixed{"step_window", "0"},
-    Fixed{"uds_ro_address", kAny},
-    Fixed{"clock_type", "OC"},
-    Fixed{"tsproc_mode", "filter"},
-    Fixed{"boundary_clock_jbod", "0"},
-    Fixed{"productDescription", kAny},  // management only
-    Fixed{"revisionData", kAny},
-    Fixed{"manufacturerIdentity", kAny},
-    Fixed{"userDescription", kAny},
-};
 
 }  // namespace
 
@@ -374,12 +336,6 @@ std::optional<ptp::ClockIdentity> parse_clock_identity(std::string_view text) {
 
 std::span<const PtpSetting> ptp_settings() { return kSettings; }
 
-std::vector<std::string> fixed_setting_names() {
-  std::vector<std::string> names;
-  for (const Fixed& fixed : kFixed) names.emplace_back(fixed.name);
-  return names;
-}
-
 std::optional<std::string> apply_setting(daemon::PtpOptions& options, std::string_view name,
                                          std::string_view value) {
   for (const PtpSetting& setting : kSettings) {
@@ -387,11 +343,7 @@ std::optional<std::string> apply_setting(daemon::PtpOptions& options, std::strin
     if (auto wrong = setting.set(options, value)) return fmt::format("{}: {}", name, *wrong);
     return std::nullopt;
   }
-  for (const Fixed& fixed : kFixed) {
-    if (name != fixed.name) continue;
-    if (std::string_view{fixed.value} == kAny || value == fixed.value) return std::nullopt;
-    return fmt::format("{}: '{}' is not supported, only {}", name, value, fixed.value);
-  }
+  if (is_fixed_setting(name)) return check_fixed_setting(name, value);
   std::vector<std::string> names;
   for (const PtpSetting& setting : kSettings) names.emplace_back(setting.name);
   return fmt::format("unknown setting '{}'{}", name, did_you_mean(suggestion(name, names)));

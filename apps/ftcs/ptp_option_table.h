@@ -5,7 +5,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "ftcs/daemon/ptp_options.h"
 
@@ -24,9 +23,6 @@ struct PtpSetting {
 
 /// The settings that have an effect.
 [[nodiscard]] std::span<const PtpSetting> ptp_settings();
-
-/// ptp4l's others, which describe what happens anyway.
-[[nodiscard]] std::vector<std::string> fixed_setting_names();
 
 /// Applies one setting by ptp4l's name. Settings of ptp4l that have no effect here are accepted
 /// with the one value that describes what happens anyway (its default, mostly), and are an error

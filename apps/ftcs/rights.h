@@ -5,9 +5,6 @@
 #include <optional>
 #include <string>
 
-#include "ftcs/daemon/ethercat/run_options.h"
-#include "ftcs/daemon/phc/phc_options.h"
-#include "ftcs/daemon/ptp_options.h"
 #include "ftcs/platform/confinement.h"
 
 namespace CLI {
@@ -15,12 +12,6 @@ class App;
 }
 
 namespace ftcs::app {
-
-/// The rights of each command, and nothing beside them: the table in docs/security.md.
-[[nodiscard]] platform::Confinement rights_of(const daemon::PtpOptions& options);
-[[nodiscard]] platform::Confinement rights_of(const daemon::PhcOptions& options);
-[[nodiscard]] platform::Confinement rights_of(const daemon::RunOptions& options);
-[[nodiscard]] platform::Confinement rights_of_segment(bool raw, bool writes_file);
 
 struct RightsArguments {
   std::string user;

@@ -7,9 +7,9 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
-#include "ftcs/daemon/ethercat/run_status.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/status_report.h"
+#include "ftcs/fieldbus/run_status.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {

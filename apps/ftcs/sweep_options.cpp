@@ -11,11 +11,13 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
-#include "apps/ftcs/interrupt.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/progress.h"
+#include "ftcs/experiment/log_replay.h"
+#include "ftcs/experiment/scenario_error.h"
 #include "ftcs/experiment/scenario_servos.h"
 #include "ftcs/experiment/toml_table.h"
+#include "ftcs/platform/interrupt.h"
 #include "ftcs/report/sweep_report.h"
 #include "ftcs/report/trace_plots.h"
 
@@ -42,9 +44,28 @@ experiment::Shard parse_shard(const std::string& text) {
   return {index - 1, count};
 }
 
-void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
+/// A name that no scenario has is misspelt: it would leave tables without that row.
+void refuse_unknown(const std::vector<std::string>& names, const std::vector<Scenario>& scenarios) {
+  std::vector<std::string> known;
+  for (const Scenario& scenario : scenarios) {
+    for (const auto& servo : scenario.servos) {
+      if (std::find(known.begin(), known.end(), servo.name) == known.end())
+        known.push_back(servo.name);
+    }
+  }
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw experiment::ScenarioError(
+          fmt::format("--servo {}: expected a file or one of {}", name, fmt::join(known, ", ")));
+    }
+  }
+}
+
+/// Returns the servos that somebody else wrote.
+ServoLibraries apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
   std::vector<std::string> names = options.servos;
   const auto libraries = load_servos(names);
+  refuse_unknown(names, scenarios);
   for (Scenario& scenario : scenarios) {
     if (options.medians_only && scenario.fresh_seeds != 0) scenario.seeds = scenario.fresh_seeds;
     if (options.seeds != 0) scenario.seeds = options.seeds;
@@ -65,6 +86,7 @@ void apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
         figure.worst = figure.within = figure.worst_of_bound = experiment::FigureLimit::kNoLimit;
     }
   }
+  return libraries;
 }
 
 SweepResult merge(const std::vector<Scenario>& scenarios, const std::vector<std::string>& files) {
@@ -109,28 +131,46 @@ void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
 
 /// The first seed of a single scenario, sample by sample; a suite has too many lines for one
 /// picture.
-std::vector<experiment::RunTrace> traces_of(const std::vector<Scenario>& scenarios) {
+std::vector<experiment::RunTrace> traces_of(const std::vector<Scenario>& scenarios,
+                                            const std::atomic<bool>& stop) try {
   std::vector<experiment::RunTrace> traces;
   if (scenarios.size() != 1) return traces;
   for (const auto& servo : scenarios.front().servos) {
     traces.emplace_back();
     (void)experiment::run_scenario(scenarios.front(), servo, scenarios.front().first_seed,
-                                   &traces.back());
+                                   &traces.back(), &stop);
   }
   return traces;
+} catch (const experiment::Interrupted&) {
+  return {};
 }
 
 }  // namespace
 
-std::vector<std::shared_ptr<const experiment::ServoLibrary>> load_servos(
-    std::vector<std::string>& servos) {
-  std::vector<std::shared_ptr<const experiment::ServoLibrary>> libraries;
+ServoLibraries load_servos(std::vector<std::string>& servos) {
+  ServoLibraries libraries;
+  std::vector<std::string> names = experiment::replay_servo_names();
+  names.emplace_back(experiment::kBoundName);
   for (const std::string& servo : servos) {
-    if (experiment::ServoLibrary::is_path(servo))
-      libraries.push_back(std::make_shared<const experiment::ServoLibrary>(servo));
+    if (!experiment::ServoLibrary::is_path(servo)) continue;
+    auto library = std::make_shared<const experiment::ServoLibrary>(servo);
+    if (std::find(names.begin(), names.end(), library->name()) != names.end()) {
+      throw std::runtime_error(
+          fmt::format("--servo {}: calls itself {}, as another servo of the table does", servo,
+                      library->name()));
+    }
+    names.push_back(library->name());
+    libraries.push_back(std::move(library));
   }
   std::erase_if(servos, &experiment::ServoLibrary::is_path);
   return libraries;
+}
+
+void say_doubts(const ServoLibraries& libraries) {
+  for (const auto& library : libraries) {
+    if (const std::string doubt = library->doubt(); !doubt.empty())
+      fmt::print(stderr, "ftcs: {}\n", doubt);
+  }
 }
 
 void add_sweep_options(CLI::App& command, SweepOptions& options) {
@@ -156,7 +196,7 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
 
 int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
                    const SweepOptions& options) {
-  apply(options, scenarios);
+  const ServoLibraries own = apply(options, scenarios);
   if (!options.trace.empty() && scenarios.size() != 1) {
     throw std::runtime_error(
         fmt::format("--trace follows one scenario, {} were given", scenarios.size()));
@@ -165,7 +205,7 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
   if (!can_write_results({options.json, options.csv, options.html, options.trace})) {
     return kRuntimeError;
   }
-  const Interrupt interrupt;
+  const platform::Interrupt interrupt;
   SweepResult sweep;
   if (!options.merge.empty()) {
     sweep = merge(scenarios, options.merge);
@@ -180,6 +220,7 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
   if (interrupt.flag())
     fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
   if (!options.quiet) print(scenarios, sweep);
+  say_doubts(own);
   // Also of a quiet run: a verdict without its reason helps nobody.
   const bool judged = shard.count == 1;
   if (judged) {
@@ -194,7 +235,7 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
       options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));
   written &= options.csv.empty() || write_result(options.csv, suite_table(sweep).to_csv());
   if (!options.html.empty() || !options.trace.empty()) {
-    const auto traces = traces_of(scenarios);
+    const auto traces = traces_of(scenarios, interrupt.flag());
     written &=
         options.html.empty() || write_result(options.html, sweep_html(sweep, origin, traces));
     written &= options.trace.empty() || write_result(options.trace, trace_csv(traces));

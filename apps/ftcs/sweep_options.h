@@ -31,10 +31,13 @@ struct SweepOptions {
   bool quiet = false;
 };
 
+using ServoLibraries = std::vector<std::shared_ptr<const experiment::ServoLibrary>>;
+
 /// The servos of `--servo` that are files, loaded; their paths are taken out of `servos`. Throws
-/// std::runtime_error.
-[[nodiscard]] std::vector<std::shared_ptr<const experiment::ServoLibrary>> load_servos(
-    std::vector<std::string>& servos);
+/// std::runtime_error, also where two rows would have one name.
+[[nodiscard]] ServoLibraries load_servos(std::vector<std::string>& servos);
+/// After the runs: says of which servos the figures are not to be believed.
+void say_doubts(const ServoLibraries& libraries);
 
 void add_sweep_options(CLI::App& command, SweepOptions& options);
 

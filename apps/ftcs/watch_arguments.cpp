@@ -42,15 +42,20 @@ void add_watch_flags(CLI::App& command, daemon::WatchOptions& options) {
                   "the same into this file every 10 s, for node_exporter's textfile collector")
       ->type_name("FILE")
       ->check(folder_is_there);
-  command
-      .add_option_function<std::string>(
-          "--metrics-names",
-          [&options](const std::string& name) {
-            options.names = name == "openshift" ? daemon::MetricsNames::kOpenShift
-                                                : daemon::MetricsNames::kFtcs;
-          },
-          "ftcs (default) or openshift: names of OpenShift's PTP operator")
-      ->check(CLI::IsMember({"ftcs", "openshift"}));
+  auto* const names = command.add_option_function<std::string>(
+      "--metrics-names",
+      [&options](const std::string& name) {
+        options.names =
+            name == "openshift" ? daemon::MetricsNames::kOpenShift : daemon::MetricsNames::kFtcs;
+      },
+      "ftcs (default) or openshift: names of OpenShift's PTP operator");
+  names->check(CLI::IsMember({"ftcs", "openshift"}));
+  // Without anybody who reads them names have no effect.
+  command.parse_complete_callback([names, &options] {
+    if (names->count() == 0 || options.is_wanted()) return;
+    throw CLI::ValidationError("--metrics-names",
+                               "expected --metrics, --metrics-file or --web with it");
+  });
 }
 
 }  // namespace ftcs::app

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/analysis/noise_for_test.h"
 #include "ftcs/analysis/statistics.h"
+#include "test/support/noise_for_test.h"
 
 namespace ftcs {
 namespace {

@@ -5,21 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "ftcs/analysis/line_fit.h"
 #include "ftcs/analysis/mtie.h"
 #include "ftcs/analysis/stability.h"
 #include "ftcs/analysis/statistics.h"
 
 namespace ftcs {
-
-/// The straight line through equally spaced values by least squares; missing values are left out.
-struct LineFit {
-  double intercept = kNoFigure;  ///< at the first place
-  double slope = kNoFigure;      ///< per second
-  double residual_rms = kNoFigure;
-};
-
-/// interval_s > 0. Fewer than two values: no figures.
-[[nodiscard]] LineFit fit_line(std::span<const double> values, double interval_s);
 
 /// Mean rates (x_(i+m) - x_i)/(m tau_0), fractional, for i = 0, m, 2m, ...; a missing point gives a
 /// missing rate.

@@ -6,26 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/analysis/noise_for_test.h"
+#include "test/support/noise_for_test.h"
 
 namespace ftcs {
 namespace {
-
-TEST(FitLine, finds_offset_and_slope_between_gaps) {
-  std::vector<double> values(100);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 5.0 - 0.25 * static_cast<double>(i);
-  values[10] = values[50] = kNoFigure;
-  const LineFit fit = fit_line(values, 0.5);
-  EXPECT_NEAR(fit.intercept, 5.0, 1e-12);
-  EXPECT_NEAR(fit.slope, -0.5, 1e-12);
-  EXPECT_NEAR(fit.residual_rms, 0.0, 1e-12);
-}
-
-TEST(FitLine, of_one_value_has_no_slope) {
-  const double one[] = {kNoFigure, 1.0};
-  EXPECT_TRUE(std::isnan(fit_line(one, 1.0).slope));
-  EXPECT_TRUE(std::isnan(fit_line({}, 1.0).slope));
-}
 
 TEST(MeanRates, are_differences_over_their_window) {
   const double phase[] = {0.0, 1.0, 4.0, kNoFigure, 8.0};

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/analysis/mtie.h"
-#include "ftcs/analysis/noise_for_test.h"
 #include "ftcs/analysis/stability.h"
+#include "test/support/noise_for_test.h"
 
 namespace ftcs {
 namespace {

@@ -70,6 +70,15 @@ double quantile_of_sorted(std::span<const double> ascending, double fraction) no
   return ascending[below] + share * (ascending[below + 1] - ascending[below]);
 }
 
+double upper_median(std::vector<double> values) {
+  const auto missing = [](double value) { return !std::isfinite(value); };
+  values.erase(std::remove_if(values.begin(), values.end(), missing), values.end());
+  if (values.empty()) return kNoFigure;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 Summary summarize(std::span<const double> values) {
   Summary summary;
   for (const double value : values) summary.moments.add(value);

@@ -50,6 +50,10 @@ class RunningStatistics {
 [[nodiscard]] double quantile_of_sorted(std::span<const double> ascending,
                                         double fraction) noexcept;
 
+/// The upper of the two middle values: one that occurs, for what is counted or rounded. Values that
+/// are not finite are left out; none: no figure.
+[[nodiscard]] double upper_median(std::vector<double> values);
+
 /// Figures that need all values at once.
 struct Summary {
   RunningStatistics moments;

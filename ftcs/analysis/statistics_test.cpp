@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/analysis/noise_for_test.h"
+#include "test/support/noise_for_test.h"
 
 namespace ftcs {
 namespace {
@@ -47,6 +47,12 @@ TEST(RunningStatistics, does_not_lose_a_small_spread_on_a_large_mean) {
   RunningStatistics statistics;
   for (int i = 0; i < 1000; ++i) statistics.add(1e9 + (i % 2 == 0 ? 1e-3 : -1e-3));
   EXPECT_NEAR(statistics.standard_deviation(), 1e-3, 1e-5);
+}
+
+TEST(UpperMedian, is_a_value_that_occurs) {
+  EXPECT_EQ(upper_median({4.0, 1.0, kNoFigure, 3.0, 2.0}), 3.0);
+  EXPECT_EQ(upper_median({2.0, 9.0, 1.0}), 2.0);
+  EXPECT_TRUE(std::isnan(upper_median({kNoFigure})));
 }
 
 TEST(RunningStatistics, merged_parts_equal_the_whole) {

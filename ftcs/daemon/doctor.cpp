@@ -2,8 +2,12 @@
 #include "ftcs/daemon/doctor.h"
 
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <thread>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "ftcs/daemon/ptp_clock.h"
 #include "ftcs/daemon/ptp_receiver.h"
@@ -66,6 +70,84 @@ PtpOptions quiet(PtpOptions options) {
   return options;
 }
 
+/// Whether somebody who is none of ours steers a clock: its frequency is looked at again and again
+/// in a thread, for as long as this lives. Nothing is touched.
+class ClockWatch {
+ public:
+  ClockWatch(platform::Kernel& kernel, const PtpOptions& options, bool hardware) {
+    const auto open = [&](platform::ClockAccess access) {
+      return hardware ? platform::ClockDevice::open_phc_of(kernel, options.interface, access)
+                      : platform::ClockDevice::open_system(kernel, access);
+    };
+    // Whoever may steer it finds it held by another program of ours, which then is no stranger.
+    if (!open(platform::ClockAccess::kSteer)) return;
+    auto device = open(platform::ClockAccess::kRead);
+    if (!device) return;
+    name_ = device->name();
+    thread_ = std::thread([this, clock = std::move(*device)]() mutable {
+      constexpr std::chrono::milliseconds kTurn{100};
+      auto last = clock.rate();
+      while (!stop_) {
+        std::this_thread::sleep_for(kTurn);
+        const auto now = clock.rate();
+        if (last && now && now->ratio() != last->ratio()) ++changes_;
+        last = now;
+      }
+    });
+  }
+  ClockWatch(const ClockWatch&) = delete;
+  ClockWatch& operator=(const ClockWatch&) = delete;
+  ~ClockWatch() { (void)changes(); }
+
+  /// How often it was changed. Ends the watch.
+  [[nodiscard]] std::uint64_t changes() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    return changes_;
+  }
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  std::atomic<bool> stop_ = false;
+  std::uint64_t changes_ = 0;
+  std::string name_;
+  std::thread thread_;
+};
+
+/// Another one that announces itself, in this domain or another.
+const diagnosis::Talker* another(const diagnosis::Talkers& heard, const PtpOptions& options,
+                                 const ptp::PortIdentity& followed) {
+  return heard.find([&](const diagnosis::Talker& talker) {
+    return talker.announces() && talker.count(ptp::MessageType::kSync) > 0 && talker.vlan == 0 &&
+           talker.version == ptp::kVersion && talker.to_group &&
+           talker.way == static_cast<diagnosis::Way>(options.socket.transport) &&
+           talker.major_sdo_id == options.major_sdo_id && talker.port.clock != followed.clock;
+  });
+}
+
+/// Two who show different times, by more than what is known of each; none: they agree.
+std::optional<diagnosis::Finding> disagreement(const ptp::PortIdentity& one, const TimeBound& first,
+                                               const diagnosis::Talker& other,
+                                               const TimeBound& second) {
+  if (first.state != TimeBound::State::kLocked || second.state != TimeBound::State::kLocked) {
+    return std::nullopt;
+  }
+  const double apart_ns = (first.time_at(second.at) - second.time).ns();
+  const double known_ns = first.half_width_ns(second.at) + second.bound_ns;
+  if (std::abs(apart_ns) <= known_ns) return std::nullopt;
+  return diagnosis::Finding{
+      diagnosis::Cause::kTransmittersDisagree,
+      fmt::format(
+          "the transmitters {} and {} (domain {}) disagree by {:.3f} us, {:.3f} us of which "
+          "may be noise",
+          to_text(one).view(), to_text(other.port).view(), other.domain, std::abs(apart_ns) * 1e-3,
+          known_ns * 1e-3),
+      "one time from both",
+      "one of them is wrong, or the path to one is asymmetric by twice as much: a third one would "
+      "tell; --delayAsymmetry takes a known asymmetry off, --acceptable-transmitter chooses",
+      true};
+}
+
 diagnosis::Finding failure(std::string text) {
   return {diagnosis::Cause::kOther, std::move(text), "", ""};
 }
@@ -82,9 +164,62 @@ std::int64_t utc_s(platform::Kernel& kernel) {
 
 }  // namespace
 
+namespace {
+
+constexpr std::uint16_t kPortOfItsOwn = 0x7FFF;
+
+/// A second one is followed for as long, by a port of its own, and its time compared.
+std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
+                                                       const PtpOptions& options, Log& log,
+                                                       const ptp::ClockIdentity& own,
+                                                       PtpReceiver& first,
+                                                       const diagnosis::Talkers& heard) {
+  const auto followed = first.transmitter();
+  if (!followed || first.time().state != TimeBound::State::kLocked) return std::nullopt;
+  const diagnosis::Talker* const other = another(heard, options, *followed);
+  if (other == nullptr) return std::nullopt;
+  PtpOptions of_other = options;
+  of_other.domain = other->domain;
+  of_other.acceptable = {};
+  (void)of_other.acceptable.add(other->port.clock);
+  auto clocks = open_ptp_clocks(kernel, of_other, log);
+  if (!clocks) return std::nullopt;
+  PortFacts facts{{own, kPortOfItsOwn - 1}};
+  facts.hardware_stamps = clocks->timestamps->is_hardware();
+  PtpReceiver second(kernel, of_other, log, std::move(clocks->timestamps), facts, nullptr);
+  (void)second.run();
+  return disagreement(*followed, first.time(), *other, second.time());
+}
+
+/// What the port, the wire and the clock that would be steered have shown.
+diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWatch& wire,
+                            ClockWatch* clock, const PtpOptions& options) {
+  diagnosis::PortSeen seen = port.seen();
+  seen.on_wire = wire.finish();
+  seen.link_up = is_link_up(kernel, options.interface);
+  seen.utc_s = utc_s(kernel);
+  if (clock != nullptr) {
+    seen.foreign_changes = clock->changes();
+    seen.clock = clock->name();
+  }
+  return seen;
+}
+
+}  // namespace
+
 Examination examine(platform::Kernel& kernel, PtpOptions given) {
-  const bool steers = given.clock != ClockKind::kVirtual && !given.epoch.any_epoch;
-  const PtpOptions options = quiet(std::move(given));
+  const bool steers = given.clock != ClockKind::kVirtual;
+  const bool any_epoch = given.epoch.any_epoch;
+  const bool system = given.clock == ClockKind::kSystem;
+  PtpOptions options = quiet(std::move(given));
+  // Switching the adapter's stamps on, or to another filter, may take them from a program that
+  // runs. An adapter without any is left to say so.
+  const auto adapter = platform::interface_capabilities(kernel, options.interface);
+  const bool ethernet = options.socket.transport == platform::NetworkTransport::kEthernet;
+  if (adapter && adapter->hardware_timestamps &&
+      !platform::has_hardware_timestamps_on(kernel, options.interface, ethernet)) {
+    options.timestamps = platform::TimestampMode::kSoftware;
+  }
   Examination result;
   Log log(kernel, stdout, options.log_level);
   auto clocks = open_ptp_clocks(kernel, options, log);
@@ -97,23 +232,26 @@ Examination examine(platform::Kernel& kernel, PtpOptions given) {
     result.findings.push_back(failure(identity.error().message()));
     return result;
   }
-  constexpr std::uint16_t kPortOfItsOwn = 0x7FFF;
   PortFacts facts{{identity->clock, kPortOfItsOwn}};
   facts.hardware_stamps = clocks->timestamps->is_hardware();
+  std::optional<ClockWatch> clock;
+  if (steers) clock.emplace(kernel, options, facts.hardware_stamps && !system);
   WireWatch wire(options.interface, identity->clock);
   PtpReceiver port(kernel, options, log, std::move(clocks->timestamps), facts, nullptr);
   (void)port.run();
-  diagnosis::PortSeen seen = port.seen();
-  seen.on_wire = wire.finish();
-  seen.steers_real_clock = steers;
-  seen.link_up = is_link_up(kernel, options.interface);
-  seen.utc_s = utc_s(kernel);
+  diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr, options);
+  seen.steers_real_clock = steers && !any_epoch;
   result.wire_unheard = wire.error();
   const diagnosis::Talkers& talkers = seen.on_wire ? *seen.on_wire : seen.at_port;
   result.heard.assign(talkers.all().begin(), talkers.all().end());
   if (port.failure() && seen.link_up) result.findings.push_back(failure(*port.failure()));
+  if (auto found = compare_with_another(kernel, options, log, identity->clock, port, talkers)) {
+    result.findings.push_back(std::move(*found));
+  }
   for (diagnosis::Finding& finding : diagnosis::diagnose_all(seen)) {
-    result.findings.push_back(std::move(finding));
+    // Beside a doubt it is no answer that the clock would lock.
+    const bool locked = finding.cause == diagnosis::Cause::kLocked;
+    if (!locked || result.findings.empty()) result.findings.push_back(std::move(finding));
   }
   return result;
 }

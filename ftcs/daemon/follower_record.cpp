@@ -175,7 +175,7 @@ std::optional<std::string> FollowerRecord::add(const node::Note& note) {
       break;
     case NoteKind::kReferenceJumped:
       log_(LogLevel::kWarning, "{}: the reference jumped by {:+.9f} s: {}", label_,
-           note.jump.seconds(), plan_text(note.plan));
+           note.jump.seconds(), note.gated ? "not followed (--max-change)" : plan_text(note.plan));
       break;
     case NoteKind::kOffsetRefused:
       log_(LogLevel::kWarning,

@@ -116,7 +116,7 @@ void StateKeeper::note(const ServoSnapshot& snapshot, FreeRunningTime now) {
   if (!latest_ || !take_result(false)) return;  // a disk that is slow, or stalled: next time
   saved_ = now;
   writing_ = std::async(std::launch::async, platform::write_durably, path_,
-                        to_text({clock_, now_s(), *latest_}));
+                        to_text({clock_, now_s(), *latest_}), platform::Readers::kOwner);
 }
 
 void StateKeeper::save() {

@@ -13,8 +13,8 @@
 
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/ptp_clock.h"
-#include "ftcs/platform/fake_clocks.h"
-#include "ftcs/ptp/monitor_fixture.h"
+#include "test/support/fake_clocks.h"
+#include "test/support/monitor_fixture.h"
 
 namespace ftcs::daemon {
 namespace {

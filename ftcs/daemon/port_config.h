@@ -21,6 +21,7 @@ template <class Config>
   config.delay_mechanism = options.delay_mechanism;
   config.peer_delay = options.peer_delay_config();
   config.assume_two_step = options.assume_two_step;
+  config.security = options.security ? &options.security->association() : nullptr;
   return config;
 }
 

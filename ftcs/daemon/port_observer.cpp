@@ -83,7 +83,7 @@ diagnosis::PortSeen PortObserver::seen(FreeRunningTime now, const PortTotals& to
   seen.receive_stamps_missing =
       since(totals.receive_stamps_missing, older_.totals.receive_stamps_missing);
   seen.unicast_dropped = since(totals.unicast_dropped, older_.totals.unicast_dropped);
-  seen.foreign_steps = since(totals.foreign_steps, older_.totals.foreign_steps);
+  seen.foreign_changes = since(totals.foreign_changes, older_.totals.foreign_changes);
   seen.samples = since(totals.samples, older_.totals.samples);
   return seen;
 }

@@ -17,7 +17,7 @@ struct PortTotals {
   ptp::Counters counters{};
   std::uint64_t receive_stamps_missing = 0;
   std::uint64_t unicast_dropped = 0;
-  std::uint64_t foreign_steps = 0;
+  std::uint64_t foreign_changes = 0;
   DisciplineCounters samples{};
 };
 

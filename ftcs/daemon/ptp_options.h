@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "ftcs/daemon/security.h"
 #include "ftcs/daemon/watch/watch.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "ftcs/discipline/steering_rules.h"
@@ -77,6 +79,8 @@ struct PtpOptions {
   bool follow_up_info = false;
   bool path_trace = false;
   ptp::AcceptableTransmitters acceptable{};
+  SecurityOptions authentication{};
+  std::shared_ptr<Security> security{};  ///< opened by `authentication`; null: none
   bool fast_start = true;
   std::uint8_t priority1 = 128;
   std::uint8_t priority2 = 128;

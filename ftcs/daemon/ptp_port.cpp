@@ -39,11 +39,17 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
 
 int PtpPort::run() {
   const platform::StopFlag stop;
-  return run([&stop] { return stop.is_set(); });
+  std::optional<platform::HangupFlag> hangup;
+  if (options_.security) hangup.emplace();
+  return run([this, &stop, &hangup] {
+    if (hangup && hangup->take()) read_keys_again();
+    return stop.is_set();
+  });
 }
 
 int PtpPort::run(const std::function<bool()>& stop) {
   for (const std::string& note : options_.notes) log_(LogLevel::kNotice, "{}", note);
+  report_keys();
   if (const auto error = open_source()) {
     fail(error->message());
     log_(LogLevel::kError, "{}", *failure_);
@@ -90,6 +96,23 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
   if (management_) management_->serve(*managed(), now());
   housekeeping(now());
   log_.flush();
+}
+
+void PtpPort::report_keys() {
+  if (!options_.security) return;
+  log_(LogLevel::kNotice, "messages are authenticated: {}", options_.security->description());
+  if (options_.security->is_readable_by_others()) {
+    log_(LogLevel::kWarning, "sa_file {}: everybody may read the keys; expected mode 0600 or 0640",
+         options_.authentication.sa_file);
+  }
+}
+
+void PtpPort::read_keys_again() {
+  if (const auto wrong = options_.security->load()) {
+    log_(LogLevel::kWarning, "{}; the keys before stay in use", *wrong);
+  } else {
+    report_keys();
+  }
 }
 
 bool PtpPort::open_time_page() {

@@ -136,6 +136,8 @@ class PtpPort : private platform::TransportHandler {
   void send(const ptp::SendMessage& message);
   [[nodiscard]] std::optional<platform::OsError> hand_over(const ptp::SendMessage& message);
   [[nodiscard]] bool open_management();
+  void report_keys();
+  void read_keys_again();
   [[nodiscard]] bool open_feed();
   bool open_time_page();
   [[nodiscard]] bool open_watch();

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
-#include "ftcs/daemon/fake_network.h"
-#include "ftcs/platform/fake_clocks.h"
+#include "test/support/fake_clocks.h"
+#include "test/support/fake_network.h"
 
 namespace ftcs::daemon {
 namespace {

@@ -169,7 +169,8 @@ PortTotals PtpReceiver::totals() {
     totals.receive_stamps_missing = socket->counters().receive_stamp_missing;
     totals.unicast_dropped = socket->counters().unicast_dropped;
   }
-  totals.foreign_steps = timestamps().foreign_steps();
+  totals.foreign_changes = timestamps().foreign_steps();
+  if (real_clock() != nullptr) totals.foreign_changes += real_clock()->clock().foreign_rates();
   totals.samples = node_.discipline().counters();
   return totals;
 }
@@ -183,7 +184,10 @@ diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
   seen.path_delay_known = node_.discipline().path_delay_known();
   seen.servo = node_.discipline().latest().servo;
   seen.rate = node_.discipline().latest().tracking_rate;
-  if (real_clock() != nullptr) seen.refusal = real_clock()->refusal().value_or("");
+  if (real_clock() != nullptr) {
+    seen.refusal = real_clock()->refusal().value_or("");
+    seen.clock = real_clock()->name();
+  }
   return seen;
 }
 
@@ -192,6 +196,17 @@ WatchState PtpReceiver::watched() {
                                  diagnosis::diagnose(seen()));
   if (const ptp::TransmitterData* transmitter = node_.port().transmitter()) {
     state.reference.set(to_text(transmitter->announce.grandmaster).view());
+  }
+  if (options().security) {
+    using ptp::Counter;
+    const ptp::Counters& count = node_.port().counters();
+    state.messages = {.present = true,
+                      .authentic = count[Counter::kAuthenticated],
+                      .missing = count[Counter::kAuthenticationMissing],
+                      .unknown_key = count[Counter::kAuthenticationUnknownKey],
+                      .wrong_code = count[Counter::kAuthenticationWrongCode],
+                      .unsupported = count[Counter::kAuthenticationUnsupported],
+                      .replayed = count[Counter::kReplayed]};
   }
   return state;
 }

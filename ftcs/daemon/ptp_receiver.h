@@ -8,6 +8,7 @@
 #include "ftcs/daemon/follower_record.h"
 #include "ftcs/daemon/port_observer.h"
 #include "ftcs/daemon/ptp_port.h"
+#include "ftcs/discipline/time_bound.h"
 #include "ftcs/node/receiver_node.h"
 
 namespace ftcs::daemon {
@@ -27,6 +28,15 @@ class PtpReceiver : public PtpPort, private Managed {
 
   /// What has come of it lately, for a diagnosis.
   [[nodiscard]] diagnosis::PortSeen seen() { return seen(now()); }
+  /// The reference's time, and between which instants it is.
+  [[nodiscard]] TimeBound time() const {
+    return time_bound(node_.discipline().latest(), node_.discipline().samples());
+  }
+  /// Whom it follows; none: nobody.
+  [[nodiscard]] std::optional<ptp::PortIdentity> transmitter() const {
+    const ptp::TransmitterData* const selected = node_.port().transmitter();
+    return selected == nullptr ? std::nullopt : std::optional(selected->port);
+  }
 
  protected:
   void housekeeping(FreeRunningTime now) override;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/daemon/ptp_transmitter.h"
 
+#include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/port_config.h"
@@ -32,6 +34,21 @@ PtpTransmitter::PtpTransmitter(platform::Kernel& kernel, const PtpOptions& optio
     : PtpCorePort(kernel, options, log, std::move(timestamps),
                   core_config(options, facts.identity)),
       facts_(facts) {}
+
+// Receivers follow the better one; this port gives way to nobody.
+void PtpTransmitter::act(const ptp::Action& action) {
+  constexpr std::size_t kMostTold = 16;
+  const auto* const seen = std::get_if<ptp::TransmitterSeen>(&action);
+  if (seen == nullptr || others_.size() == kMostTold ||
+      std::find(others_.begin(), others_.end(), seen->port) != others_.end()) {
+    return;
+  }
+  others_.push_back(seen->port);
+  log()(LogLevel::kWarning,
+        "port 1 ({}): {} announces itself in domain {} too: receivers follow the better of the two "
+        "(priority1, clockClass), and this port goes on",
+        options().interface, to_text(seen->port).view(), options().domain);
+}
 
 int PtpTransmitter::finish() {
   using ptp::Counter;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "ftcs/daemon/ptp_core_port.h"
 #include "ftcs/ptp/time_transmitter.h"
@@ -15,12 +16,14 @@ class PtpTransmitter final : public PtpCorePort<ptp::TimeTransmitter>, private M
                  std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts);
 
  private:
+  void act(const ptp::Action& action) override;
   [[nodiscard]] int finish() override;
   [[nodiscard]] Managed* managed() override { return this; }
   [[nodiscard]] ptp::ManagedPort managed_port() override;
   [[nodiscard]] std::string status(const ptp::ManagementCounters& management) override;
 
   PortFacts facts_;
+  std::vector<ptp::PortIdentity> others_{};  ///< who announced themselves too, and were told of
 };
 
 }  // namespace ftcs::daemon

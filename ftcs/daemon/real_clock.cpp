@@ -72,6 +72,11 @@ bool RealClock::admits(ReferenceTime reference, FreeRunningTime event) noexcept 
   return utc_.admits(reference, event, kernel_.clock_ns(CLOCK_REALTIME));
 }
 
+bool RealClock::admits_change(Duration change) const noexcept {
+  const node::EpochRules& rules = utc_.config().epoch;
+  return rules.largest_change == Nanoseconds{0} || abs(change) <= Duration{rules.largest_change};
+}
+
 // The system clock shows UTC. An adapter's shows what its reference does, or TAI by the system
 // clock.
 void RealClock::follow_offset() {

@@ -45,6 +45,7 @@ class RealClock final : public node::ReferenceGate {
   /// Whether a reading of the reference may steer; no message must reach the servo without.
   /// `event`: the same instant on the clock's free-running face.
   [[nodiscard]] bool admits(ReferenceTime reference, FreeRunningTime event) noexcept override;
+  [[nodiscard]] bool admits_change(Duration change) const noexcept override;
   /// Has local time moved under the servo's feet since the last question, other than by a leap?
   [[nodiscard]] bool take_scale_change() { return std::exchange(scale_changed_, false); }
   /// Why nothing has been followed so far, if that is why: the run has failed.

@@ -14,9 +14,9 @@
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/ptp_receiver.h"
 #include "ftcs/daemon/sample_report.h"
-#include "ftcs/platform/fake_clocks.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "ftcs/sim/settable_source.h"
+#include "test/support/fake_clocks.h"
 
 namespace ftcs::daemon {
 namespace {

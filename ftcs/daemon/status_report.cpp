@@ -110,6 +110,12 @@ void add_line(std::string& text, const char* name, const std::string& value) {
   text += fmt::format("{:<16}{}\n", name, value);
 }
 
+void add_sentence(std::string& text, const Json& status) {
+  const auto found = status.find("diagnosis");
+  if (found == status.end() || !found->is_object()) return;
+  add_line(text, "in a sentence", word(*found, "sentence"));
+}
+
 void add_refusals(std::string& text, const Json& status) {
   const auto found = status.find("refusals");
   if (found == status.end() || !found->is_array()) return;
@@ -123,10 +129,7 @@ void add_refusals(std::string& text, const Json& status) {
 
 void add_follower_lines(std::string& text, const Json& status) {
   add_line(text, "locked", locked_text(status));
-  const auto found = status.find("diagnosis");
-  if (found != status.end() && found->is_object()) {
-    add_line(text, "in a sentence", word(*found, "sentence"));
-  }
+  add_sentence(text, status);
   add_line(text, "state", word(status, "state"));
   add_line(text, "offset",
            fmt::format("{} +/- {}", time_text(status, "offset_ns"),
@@ -221,6 +224,7 @@ std::string ethercat_text(const Json& status) {
       fmt::format("{}, servo {}, phase {:+.3f} us, rate {:+.3f} ppm, margin {:.1f} us",
                   word(status, "state"), word(status, "servo"), figure(status, "phase_ns") * 1e-3,
                   figure(status, "rate_ppb") * 1e-3, figure(status, "margin_ns") * 1e-3));
+  add_sentence(text, status);
   double furthest_ns = 0.0;
   for (const Json& drive : drives) {
     furthest_ns = std::max(furthest_ns, figure(drive, "system_time_difference_ns"));

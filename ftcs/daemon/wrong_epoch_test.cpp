@@ -8,11 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
-#include "ftcs/daemon/fake_network.h"
 #include "ftcs/daemon/phc/phc_runner.h"
 #include "ftcs/daemon/ptp_port.h"
-#include "ftcs/platform/fake_clocks.h"
 #include "ftcs/ptp/wire/codec.h"
+#include "test/support/fake_clocks.h"
+#include "test/support/fake_network.h"
 
 namespace ftcs::daemon {
 namespace {

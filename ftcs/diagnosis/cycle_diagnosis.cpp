@@ -27,7 +27,7 @@ constexpr std::array kAdvice{
     Advice{Cause::kTooFewSubDevices, "all that --drives names",
            "look at cables and power behind the last one, or lower --drives"},
     Advice{Cause::kNoDistributedClock, "a drive with a distributed clock",
-           "the cycle can run without (--servo none), but nothing is in phase with it"},
+           "drives that need none run without (--servo none), and nothing is in phase with them"},
     Advice{Cause::kLostFrames, "each frame back within its cycle",
            "a network of its own for the drives, a longer --cycle"},
     Advice{Cause::kWorkingCounter, "every drive's share of it",
@@ -70,6 +70,11 @@ std::size_t write_seen(std::span<char> text, Cause cause, const CycleSeen& seen)
     case Cause::kMarginTooSmall:
       return write(FMT_STRING("frames arrive {:.1f} us before SYNC0, cycle {:.0f} us"),
                    seen.margin_ns * 1e-3, seen.cycle_ns * 1e-3);
+    case Cause::kDrivesNotOperational:
+      return write(FMT_STRING("a drive is not in OP, working counter {} of {}"),
+                   seen.working_counter, seen.expected_counter);
+    case Cause::kOther:
+      return write(FMT_STRING("{}"), ethercat::name(seen.failure));
     default:
       return write(FMT_STRING("phase {:+.3f} us, margin {:.1f} us, working counter {} of {}"),
                    seen.phase_ns * 1e-3, seen.margin_ns * 1e-3, seen.working_counter,
@@ -90,8 +95,8 @@ Cause cause_of_failure(const CycleSeen& seen) noexcept {
       return Cause::kWorkingCounter;
     case FailureKind::kLinkLost:
       return Cause::kLostFrames;
-    default:
-      return Cause::kOther;
+    default:  // a drive that needs a clock and has none refuses SAFEOP
+      return seen.has_reference || seen.drives == 0 ? Cause::kOther : Cause::kNoDistributedClock;
   }
 }
 
@@ -105,6 +110,11 @@ bool is_narrow(const CycleSeen& seen) noexcept {
 bool is_often(std::uint64_t count, std::uint64_t cycles) noexcept {
   constexpr std::uint64_t kOneIn = 10;
   return cycles > 0 && count * kOneIn > cycles;
+}
+
+std::string_view beginning(Cause cause, CycleState state) noexcept {
+  if (state != CycleState::kLocked) return "not locked: ";
+  return cause == Cause::kLocked ? "locked: " : "in phase, but ";
 }
 
 }  // namespace
@@ -123,7 +133,7 @@ Cause cause_of(const CycleSeen& seen) noexcept {
 
 std::string_view write_sentence(std::span<char> text, const CycleSeen& seen) {
   const Cause cause = cause_of(seen);
-  const std::string_view begin = seen.state == CycleState::kLocked ? "locked: " : "not locked: ";
+  const std::string_view begin = beginning(cause, seen.state);
   std::size_t used = std::min(begin.size(), text.size());
   std::copy_n(begin.begin(), used, text.begin());
   used += write_seen(text.subspan(used), cause, seen);

@@ -35,7 +35,8 @@ struct CycleSeen {
 /// if its frames hardly arrive before SYNC0, kDrivesNotOperational if a drive is not in OP.
 /// Like the two below, for the cyclic path: no heap.
 [[nodiscard]] Cause cause_of(const CycleSeen& seen) noexcept;
-/// "locked: ...", or "not locked: ...; expected ...; ...", at most text.size() characters.
+/// "locked: ...", or "not locked: ...; expected ...; ...", at most text.size() characters. A cycle
+/// that is locked and has a cause nevertheless is "in phase, but ...; expected ...; ...".
 std::string_view write_sentence(std::span<char> text, const CycleSeen& seen);
 
 [[nodiscard]] Finding diagnose(const CycleSeen& seen);

@@ -36,10 +36,18 @@ const std::array kCases{
          "no SubDevice answers"},
     Case{Cause::kTooFewSubDevices, [](CycleSeen& s) { s.drives = 5; }, "5 SubDevices of 8"},
     Case{Cause::kNoDistributedClock, [](CycleSeen& s) { s.has_reference = false; }, "--servo none"},
+    Case{Cause::kNoDistributedClock,
+         [](CycleSeen& s) {
+           s.has_reference = false;
+           s.failure = ethercat::FailureKind::kStateRefused;
+         },
+         "none of 8 SubDevices"},
     Case{Cause::kLostFrames, [](CycleSeen& s) { s.lost = 200; }, "200 of the last 1000 frames"},
     Case{Cause::kWorkingCounter, [](CycleSeen& s) { s.working_counter = 21; }, "21 of 24"},
     Case{Cause::kHostLate, [](CycleSeen& s) { s.late = 300; }, "more than 200 us late"},
     Case{Cause::kMarginTooSmall, [](CycleSeen& s) { s.margin_ns = 20e3; }, "--sync0-phase"},
+    Case{Cause::kOther, [](CycleSeen& s) { s.failure = ethercat::FailureKind::kInOperation; },
+         ethercat::name(ethercat::FailureKind::kInOperation)},
     Case{Cause::kAcquiring, [](CycleSeen& s) { s.state = CycleState::kAcquiring; }, "phase"},
     Case{Cause::kDrivesNotOperational, [](CycleSeen& s) { s.operational = false; }, "AL status"},
 };
@@ -70,6 +78,17 @@ TEST(CycleDiagnosis, only_a_locked_cycle_is_called_locked) {
   }
 }
 
+TEST(CycleDiagnosis, a_locked_cycle_with_a_cause_is_not_called_locked) {
+  for (const Case& one : kCases) {
+    CycleSeen seen = good();
+    one.change(seen);
+    if (seen.state != CycleState::kLocked) continue;
+    std::array<char, 400> text{};
+    const std::string written(write_sentence(text, seen));
+    EXPECT_EQ(written.find("locked") != std::string::npos, one.cause == Cause::kLocked) << written;
+  }
+}
+
 TEST(CycleDiagnosis, the_cyclic_path_touches_no_heap_and_no_more_than_its_room) {
   std::array<char, 40> text{};
   CycleSeen seen = good();
@@ -80,7 +99,7 @@ TEST(CycleDiagnosis, the_cyclic_path_touches_no_heap_and_no_more_than_its_room) 
     written = write_sentence(text, seen);
   }
   EXPECT_LE(written.size(), text.size());
-  EXPECT_TRUE(written.starts_with("locked: 500 of"));
+  EXPECT_TRUE(written.starts_with("in phase, but 500 of"));
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ std::string_view name(Cause cause) noexcept {
       "sdo",
       "domain",
       "not_acceptable",
+      "not_authentic",
       "unusable_announce",
       "alternate",
       "malformed",
@@ -36,6 +37,7 @@ std::string_view name(Cause cause) noexcept {
       "no_delay_resp",
       "delay_resp_for_others",
       "two_transmitters",
+      "transmitters_disagree",
       "timescale",
       "first_offset",
       "other_steers",
@@ -54,7 +56,9 @@ std::string_view name(Cause cause) noexcept {
 }
 
 std::string sentence(const Finding& finding) {
-  std::string text = finding.cause == Cause::kLocked ? "locked: " : "not locked: ";
+  std::string text = finding.cause == Cause::kLocked ? "locked: "
+                     : finding.in_doubt              ? "in doubt: "
+                                                     : "not locked: ";
   text += finding.seen;
   if (!finding.expected.empty()) text += "; expected " + finding.expected;
   if (!finding.remedy.empty()) text += "; " + finding.remedy;

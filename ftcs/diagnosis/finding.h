@@ -23,6 +23,7 @@ enum class Cause : std::uint8_t {
   kSdo,           ///< another majorSdoId (transportSpecific)
   kDomain,
   kNotAcceptable,  ///< not in the list of acceptable transmitters
+  kNotAuthentic,   ///< no authentication, or by other keys
   kUnusableAnnounce,
   kAlternate,  ///< alternateMasterFlag
   kMalformed,
@@ -41,7 +42,8 @@ enum class Cause : std::uint8_t {
   kOtherMechanism,  ///< it measures peer to peer, this port end to end
   kNoDelayResp,
   kDelayRespForOthers,
-  kTwoTransmitters,  ///< of one identity, or in turn
+  kTwoTransmitters,       ///< of one identity, or in turn
+  kTransmittersDisagree,  ///< two show different times: one is wrong, or a path is asymmetric
   // Time that is not believed, and clocks that do not obey.
   kTimescale,  ///< refused by the epoch's rules: see the reason
   kFirstOffset,
@@ -67,12 +69,14 @@ inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kOther) +
 /// is left out.
 struct Finding {
   Cause cause = Cause::kOther;
-  std::string seen;      ///< what was observed
-  std::string expected;  ///< what should have been
-  std::string remedy;    ///< the flag or setting that mends it
+  std::string seen;       ///< what was observed
+  std::string expected;   ///< what should have been
+  std::string remedy;     ///< the flag or setting that mends it
+  bool in_doubt = false;  ///< the clock follows, but what it follows is not to be relied on
 };
 
-/// "not locked: SEEN; expected EXPECTED; REMEDY". Of kLocked: "locked: SEEN".
+/// "not locked: SEEN; expected EXPECTED; REMEDY". Of kLocked: "locked: SEEN". Of a clock that
+/// follows all the same: "in doubt: SEEN; ...".
 [[nodiscard]] std::string sentence(const Finding& finding);
 
 }  // namespace ftcs::diagnosis

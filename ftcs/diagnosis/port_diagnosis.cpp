@@ -32,6 +32,8 @@ std::vector<Finding> diagnose_all(const PortSeen& seen) {
   // A real clock does not follow what a virtual one may.
   if (seen.steers_real_clock) add(refusals_of_time(seen));
   if (seen.locked) {
+    auto steered = other_steers(seen);
+    if (steered && !seen.clock.empty()) all.push_back(std::move(*steered));
     if (all.empty()) all.push_back({Cause::kLocked, figures(seen), "", ""});
   } else {
     const auto rules = seen.has_transmitter ? rules_of_measuring() : rules_of_hearing();

@@ -40,7 +40,8 @@ struct PortSeen {
   std::optional<Talkers> on_wire{};  ///< by a listener to all frames; none: nobody listened
   std::uint64_t receive_stamps_missing = 0;
   std::uint64_t unicast_dropped = 0;
-  std::uint64_t foreign_steps = 0;  ///< of the steered clock, by other programs
+  std::uint64_t foreign_changes = 0;  ///< of the steered clock, by other programs
+  std::string clock{};                ///< its name; empty: a virtual one, which nobody else can set
   std::optional<Duration> peer_delay{};
   // The clock.
   bool locked = false;

@@ -107,6 +107,12 @@ std::vector<Case> refused() {
       {Cause::kNotAcceptable,
        with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kUnacceptableTransmitter); }),
        "--acceptable-transmitter"},
+      {Cause::kNotAuthentic,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kAuthenticationMissing, 4); }),
+       "or none here"},
+      {Cause::kNotAuthentic,
+       with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kAuthenticationWrongCode, 4); }),
+       "4 with a wrong code"},
       {Cause::kUnusableAnnounce,
        with(fresh(), [](PortSeen& s) { s.counters.add(Counter::kUnusableAnnounce); }),
        "--clockIdentity"},
@@ -184,7 +190,7 @@ std::vector<Case> measured() {
        "one identity"},
       {Cause::kTimescale, with(followed(), [](PortSeen& s) { s.refusal = "it shows 1970"; }),
        "1970"},
-      {Cause::kOtherSteers, with(followed(), [](PortSeen& s) { s.foreign_steps = 2; }), "chrony"},
+      {Cause::kOtherSteers, with(followed(), [](PortSeen& s) { s.foreign_changes = 2; }), "chrony"},
       {Cause::kSamplesRefused, with(followed(), [](PortSeen& s) { s.samples.rejected = 9; }),
        "9 of 9"},
   };
@@ -208,6 +214,17 @@ TEST(PortDiagnosis, a_locked_port_says_so_whatever_else_was_counted) {
   seen.counters.add(Counter::kMissingTransmitStamp, 3);
   EXPECT_EQ(diagnose(seen).cause, Cause::kLocked);
   EXPECT_TRUE(sentence(diagnose(seen)).starts_with("locked: offset "));
+}
+
+TEST(PortDiagnosis, a_clock_that_another_program_moves_too_is_in_doubt_and_not_called_locked) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  seen.foreign_changes = 3;
+  EXPECT_EQ(diagnose(seen).cause, Cause::kLocked) << "a virtual one stands apart";
+  seen.clock = "/dev/ptp0";
+  EXPECT_EQ(diagnose(seen).cause, Cause::kOtherSteers);
+  const std::string text = sentence(diagnose(seen));
+  EXPECT_TRUE(text.starts_with("in doubt: another program changed /dev/ptp0 3 times")) << text;
 }
 
 std::vector<std::uint8_t> frame(const std::vector<std::uint8_t>& message) {

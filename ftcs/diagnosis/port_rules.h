@@ -26,6 +26,8 @@ using PortRule = std::optional<Finding> (*)(const PortSeen& seen);
 [[nodiscard]] std::vector<Finding> refusals_of_time(const PortSeen& seen);
 /// What keeps nobody from locking, and is worth a word.
 [[nodiscard]] std::vector<Finding> remarks(const PortSeen& seen);
+/// Another program changes the clock that is steered.
+[[nodiscard]] std::optional<Finding> other_steers(const PortSeen& seen);
 /// The neighbour of a port that measures peer to peer does not answer.
 [[nodiscard]] std::optional<Finding> no_peer(const PortSeen& seen);
 

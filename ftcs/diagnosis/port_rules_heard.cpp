@@ -57,6 +57,25 @@ Found not_acceptable(const PortSeen& seen) {
                  "a transmitter of that list", "--acceptable-transmitter " + identity + " adds it"};
 }
 
+Found not_authentic(const PortSeen& seen) {
+  const ptp::Counters& count = seen.counters;
+  const std::uint64_t missing = count[Counter::kAuthenticationMissing];
+  const std::uint64_t unknown = count[Counter::kAuthenticationUnknownKey];
+  const std::uint64_t wrong =
+      count[Counter::kAuthenticationWrongCode] + count[Counter::kAuthenticationUnsupported];
+  if (missing + unknown + wrong == 0) return std::nullopt;
+  std::string remedy =
+      "spp, active_key_id and the keys of sa_file must be those of the transmitter";
+  if (unknown + wrong == 0)
+    remedy = "sa_file, spp and active_key_id at the transmitter, or none here";
+  return Finding{
+      Cause::kNotAuthentic,
+      fmt::format("messages are dropped, as they are not authentic: {} without authentication, {} "
+                  "by a key that is not in sa_file, {} with a wrong code",
+                  missing, unknown, wrong),
+      "an AUTHENTICATION TLV by a key of this port's association", remedy};
+}
+
 Found not_capable(const PortSeen& seen) {
   if (seen.counters[Counter::kNotCapable] == 0) return std::nullopt;
   const PortSettings& settings = seen.settings;
@@ -259,14 +278,22 @@ bool is_for(const Talker& talker, const PortSettings& settings) noexcept {
 }
 
 std::span<const PortRule> rules_of_hearing() noexcept {
-  static constexpr std::array<PortRule, 15> kRules{
-      link_down,      not_acceptable,
-      not_capable,    unusable_announce,
-      alternate,      unicast,
-      not_delivered,  sync_without_announce,
-      domain,         sdo,
-      transport,      vlan,
-      version,        malformed,
+  static constexpr std::array<PortRule, 16> kRules{
+      link_down,
+      not_acceptable,
+      not_authentic,
+      not_capable,
+      unusable_announce,
+      alternate,
+      unicast,
+      not_delivered,
+      sync_without_announce,
+      domain,
+      sdo,
+      transport,
+      vlan,
+      version,
+      malformed,
       only_receivers,
   };
   return kRules;

@@ -131,18 +131,7 @@ Found no_delay_answer(const PortSeen& seen) {
   return Finding{
       Cause::kNoDelayResp, asked, "a Delay_Resp to each",
       "the requests do not reach the transmitter (firewall, UDP port 319, multicast), or "
-      "it wants another transport or mechanism (-P, --hybrid_e2e 1)"};
-}
-
-Found other_steers(const PortSeen& seen) {
-  if (seen.foreign_steps == 0) return std::nullopt;
-  return Finding{
-      Cause::kOtherSteers,
-      fmt::format("another program set the steered clock {} times in {:.0f} s", seen.foreign_steps,
-                  seen.seconds),
-      "one program that steers it",
-      "stop the other (systemctl stop chrony systemd-timesyncd ntpsec phc2sys), or feed it "
-      "with --chrony-sock"};
+      "it wants another transport or mechanism (-P, --hybrid_e2e 1) or authentication (--spp)"};
 }
 
 Found samples_refused(const PortSeen& seen) {
@@ -161,6 +150,19 @@ Found samples_refused(const PortSeen& seen) {
 }
 
 }  // namespace
+
+std::optional<Finding> other_steers(const PortSeen& seen) {
+  if (seen.foreign_changes == 0) return std::nullopt;
+  return Finding{
+      Cause::kOtherSteers,
+      fmt::format("another program changed {} {} times in {:.0f} s",
+                  seen.clock.empty() ? "the steered clock" : seen.clock, seen.foreign_changes,
+                  seen.seconds),
+      "one program that steers it",
+      "stop the other (systemctl stop chrony systemd-timesyncd ntpsec phc2sys), or feed it "
+      "with --chrony-sock",
+      seen.locked};
+}
 
 std::optional<Finding> no_peer(const PortSeen& seen) {
   if (!seen.settings.peer_to_peer || seen.peer_delay) return std::nullopt;

@@ -38,6 +38,7 @@ struct ServoTraits {
   Nanoseconds sync_interval{0};  ///< zero: as the messages come
   bool path_delay_is_fixed = false;
   bool decides_steps = false;  ///< has thresholds of its own, and its start-up depends on them
+  bool steers = true;          ///< else it only reports, and a lock is an offset that stays small
 };
 
 /// The one place where a servo meets a clock.

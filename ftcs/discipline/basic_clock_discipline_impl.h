@@ -41,7 +41,9 @@ Telemetry BasicClockDiscipline<Servo>::on_pair(const EventPair& event, bool pace
   }
   if (paces && event.direction == Direction::kForward) {
     if (used || lock_survives(pair)) note_sample(event);
-    if (used && telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
+    // Offsets seen before the servo steers are the oscillator's own: small ones are luck, no lock.
+    const bool steers = !traits_.steers || telemetry_.servo.state != ServoState::kUnlocked;
+    if (used && steers && telemetry_.servo.offset_known) lock_.update(telemetry_.servo.offset);
   }
   check_silence(now);
   if (update.has_command) steer(update.command, telemetry_.servo.offset);

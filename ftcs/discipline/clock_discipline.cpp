@@ -33,8 +33,12 @@ bool has_fixed_delay(const ServoConfig& servo) noexcept {
 
 ServoTraits traits_of(const ServoConfig& servo) noexcept {
   const bool plans = servo.kind == ServoKind::kAdaptive;
-  return {servo.limits, plans ? servo.adaptive.steering.rate : servo.limits, servo.sync_interval,
-          has_fixed_delay(servo), servo.kind == ServoKind::kLinuxptpPi};
+  return {servo.limits,
+          plans ? servo.adaptive.steering.rate : servo.limits,
+          servo.sync_interval,
+          has_fixed_delay(servo),
+          servo.kind == ServoKind::kLinuxptpPi,
+          servo.kind != ServoKind::kFreeRunning};
 }
 
 }  // namespace

@@ -428,6 +428,24 @@ TEST_F(ClockDisciplineTest, locks_after_the_dwell_and_loses_the_lock_outside_the
   EXPECT_FALSE(sync_and_wait().locked);
 }
 
+// A clock that is right by luck and half a ppm fast: s0 of linuxptp-pi measures for a while and
+// steers nothing, and what nobody steers is not locked.
+TEST_F(ClockDisciplineTest, does_not_lock_before_its_servo_steers) {
+  DisciplineConfig config = config_for(ServoKind::kLinuxptpPi);
+  config.lock = {{Nanoseconds{10'000}, Nanoseconds{20'000}}, 1};
+  reference_rate_ = Rate::from_ppm(0.5);
+  start(Nanoseconds{99}, config);
+  int unlocked = 0;
+  for (int n = 0; n < 40; ++n) {
+    const Telemetry seen = sync_and_wait();
+    if (seen.servo.state != ServoState::kUnlocked) continue;
+    ++unlocked;
+    EXPECT_FALSE(seen.locked);
+  }
+  EXPECT_GT(unlocked, 0);
+  EXPECT_TRUE(discipline_->latest().locked);
+}
+
 TEST_F(ClockDisciplineTest, an_unknown_path_delay_is_no_offset_and_no_lock) {
   DisciplineConfig config = config_for(ServoKind::kFtcs);
   config.servo.two_way.fixed_path_delay.reset();

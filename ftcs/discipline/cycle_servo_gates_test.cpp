@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The world of test/cycle_world.h, and what the cycle servo does with cycles that tell nothing, or
 // something wrong.
-#include "ftcs/discipline/test/cycle_world.h"
+#include "test/support/cycle_world.h"
 
 namespace ftcs {
 namespace {

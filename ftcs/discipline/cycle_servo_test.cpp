@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/discipline/test/cycle_world.h"
+#include "test/support/cycle_world.h"
 #include "test/support/forbid_allocation.h"
 
 namespace ftcs {

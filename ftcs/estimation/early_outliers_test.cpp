@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/estimation/listener_for_test.h"
+#include "test/support/listener_for_test.h"
 
 namespace ftcs::estimation {
 namespace {

@@ -34,6 +34,11 @@ struct RecordWindow {
   [[nodiscard]] double time(const RecordedMessage& message) const noexcept {
     return static_cast<double>(static_cast<std::int32_t>(message.time - now)) / kUnitsPerCycle;
   }
+  [[nodiscard]] double oldest() const noexcept { return time((*this)[0]); }
+  void drop_oldest() noexcept {
+    first = first + 1 == capacity ? 0 : first + 1;
+    --size;
+  }
   static constexpr double kUnitsPerCycle = 131072.0;  ///< 2^17: 32,768 cycles in 32 bits
 };
 

@@ -58,10 +58,18 @@ void FloorSearch::alarm(int scans) noexcept { alarm_ = std::max(alarm_, scans); 
 
 std::size_t FloorSearch::stride() const noexcept { return best_in_recent_ ? 1 : record_.stride(); }
 
+/// Of both directions from the same moment on, as far as there are enough: before it one alone
+/// would show a rate that has changed since as messages that waited.
 PerDirection<RecordWindow> FloorSearch::windows(std::size_t wanted, bool recent) const noexcept {
   PerDirection<RecordWindow> out;
   for (const Direction direction : kDirections) {
     out[direction] = recent ? recent_.window(direction, wanted) : record_.window(direction, wanted);
+  }
+  if (std::min(out.forward.size, out.backward.size) == 0) return out;
+  for (const Direction direction : kDirections) {
+    RecordWindow& window = out[direction];
+    const double since = out[opposite(direction)].oldest();
+    while (window.size > kShortestWindow && window.time(window[1]) < since) window.drop_oldest();
   }
   return out;
 }

@@ -17,23 +17,22 @@ class Lateness {
   /// backward).
   void observe(std::size_t side, bool late, double distance) noexcept {
     for (Side& each : sides_) {
-      if (each.remembered > 0 && --each.remembered == 0) each.sign = 0;
+      if (each.remembered > 0 && --each.remembered == 0) each.came = Came::kAsBelieved;
     }
     if (distance < kPlain) return;
-    sides_[side] = {static_cast<std::int8_t>(late ? 1 : -1), kMemory};
+    sides_[side] = {late ? Came::kLate : Came::kEarly, kMemory};
   }
   /// Whether a clock that changed can have brought it, both directions being
   /// there.
   [[nodiscard]] bool speaks_of_clock() const noexcept {
-    const int ahead = static_cast<int>(sides_[0].sign);
-    const int back = static_cast<int>(sides_[1].sign);
-    return ahead * back <= 0;
+    return sides_[0].came == Came::kAsBelieved || sides_[0].came != sides_[1].came;
   }
   void clear() noexcept { sides_ = {}; }
 
  private:
+  enum class Came : std::uint8_t { kAsBelieved, kLate, kEarly };
   struct Side {
-    std::int8_t sign = 0;  ///< +1 late, -1 early, 0 as believed
+    Came came = Came::kAsBelieved;
     std::uint8_t remembered = 0;
   };
   static constexpr double kPlain = 9.0;  ///< three sigma

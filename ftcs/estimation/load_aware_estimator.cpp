@@ -25,10 +25,6 @@ constexpr double kLeastPart = 0.02;
 constexpr double kUseful = 1.0 / 16.0;
 /// Sigma of the fit within which the two pictures agree.
 constexpr double kAgree = 3.0;
-/// Noise in the first picture against that of the floor's.
-constexpr double kBlunt = 2.5;
-/// Nats for a floor, where a changed frequency mostly gives 25 to 35.
-constexpr double kBeyondDoubt = 80.0;
 /// Four messages that the first picture explains and the second does not, while
 /// it is sharp, or two while it is much sharper; each that both explain takes
 /// half a one away, unless they are far apart.
@@ -51,11 +47,15 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
   believed_ = false;
 }
 
+/// Of the first picture, where it is larger.
+template <class Grid>
+double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
+  return std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
+}
+
 template <class Grid>
 bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
-  const double noise =
-      std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
-  return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), noise);
+  return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), plain_noise_ns());
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -69,23 +69,12 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
-/// A frequency that has changed leaves the same corner in the record as messages that waited. Waits
-/// that go on are late now, or have made the first picture blunt, or are seen beyond doubt.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::waits_now() const noexcept {
-  const double noise =
-      std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
-  return late_ > 0 || noise > kBlunt * floor_.scale() || floor_.evidence() > kBeyondDoubt;
-}
-
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
-  const double noise =
-      std::max({plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward),
-                plain_.offset_sigma_ns(0.0)});
+  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
   const bool contradicts = noise < kFarApart * apart;
   const bool sharp =
@@ -160,7 +149,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
-  const bool convinces = believed_ || (agreed && waits_now()) || lead > kBelieved;
+  const bool convinces = believed_ || agreed || lead > kBelieved;
   believed_ = floor_.locked() && lead >= kDisbelieved && convinces;
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits

@@ -74,9 +74,9 @@ class LoadAwareEstimator {
 
  private:
   void forget_floor() noexcept;
+  [[nodiscard]] double plain_noise_ns() const noexcept;
   [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
-  [[nodiscard]] bool waits_now() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   void start_floor() noexcept;
   void compare(double credit, double own) noexcept;

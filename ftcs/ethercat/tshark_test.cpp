@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/ethercat/maindevice/csp_profile.h"
-#include "ftcs/ethercat/test/main_bench.h"
+#include "test/support/main_bench.h"
 #include "test/support/shell_lines.h"
 
 namespace ftcs::ethercat {

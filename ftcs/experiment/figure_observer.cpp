@@ -11,11 +11,13 @@ double DwellTracker::start() const noexcept {
   return found_ ? *entered_ : std::numeric_limits<double>::infinity();
 }
 
-FigureObserver::FigureObserver(const Scenario& scenario, RunTrace* trace)
+FigureObserver::FigureObserver(const Scenario& scenario, RunTrace* trace,
+                               const std::atomic<bool>* stop)
     : plan_(scenario.plan),
       interval_s_(scenario.world.interval.seconds()),
       node_(scenario.world.nodes.size() - 1),
       trace_(trace),
+      stop_(stop),
       c5_(plan_.converged_band_ns, plan_.converged_dwell_cycles),
       after_event_(plan_.converged_band_ns, plan_.converged_dwell_cycles) {
   if (trace_ != nullptr) trace_->interval_s = interval_s_;
@@ -42,6 +44,7 @@ void FigureObserver::follow_event(double time_s, double error_ns) {
 }
 
 void FigureObserver::on_truth(const sim::TruthSample& sample) {
+  if (stop_ != nullptr && stop_->load(std::memory_order_relaxed)) throw Interrupted{};
   if (sample.node != node_) return;
   if (!plan_.at_samples) add_truth(sample.cycle, sample.time_s, sample.time_error_ns);
   if (measured(sample.cycle)) rate_error_.add(sample.tracking_error_ppb);

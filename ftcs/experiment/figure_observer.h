@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <optional>
 
 #include "ftcs/analysis/statistics.h"
@@ -39,7 +40,8 @@ class DwellTracker {
 /// Watches the last clock of the chain and makes the figures of a run, in constant memory.
 class FigureObserver final : public sim::TwoWayObserver {
  public:
-  FigureObserver(const Scenario& scenario, RunTrace* trace);
+  /// `stop`, once set, ends the run: Interrupted is thrown. Null: nobody will.
+  FigureObserver(const Scenario& scenario, RunTrace* trace, const std::atomic<bool>* stop);
 
   void on_truth(const sim::TruthSample& sample) override;
   void on_pair(const sim::PairSample& sample) override;
@@ -57,6 +59,7 @@ class FigureObserver final : public sim::TwoWayObserver {
   double interval_s_;
   std::size_t node_;
   RunTrace* trace_;
+  const std::atomic<bool>* stop_;
   RunningStatistics time_error_;
   RunningStatistics perceived_;
   RunningStatistics rate_error_;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "ftcs/discipline/clock_discipline.h"
-#include "ftcs/experiment/recorded_log.h"
 #include "ftcs/experiment/servo_library.h"
+#include "ftcs/record/recorded_log.h"
 
 namespace ftcs::experiment {
 

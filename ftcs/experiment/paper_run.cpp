@@ -57,7 +57,7 @@ void run_row(const PaperRow& row, std::uint64_t seed, Observer observe) {
     sim::run_one_way(row.world, seed, law, observe);
   } else {
     const ServoConfig common = common_config(row.world);
-    const ServoInstance instance(*std::get<ExternalPaperServo>(row.servo).library, common);
+    const ServoInstance instance(*std::get<ExternalPaperServo>(row.servo).plugin, common);
     ExternalConfig config = instance.config();
     config.fixed_path_delay = common.two_way.fixed_path_delay;
     ForwardOnly<ExternalServo> law(config);

@@ -22,7 +22,7 @@ inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
 
 /// A servo that somebody else wrote, given the row's interval and limits.
 struct ExternalPaperServo {
-  std::shared_ptr<const ServoLibrary> library;
+  std::shared_ptr<const ServoLibrary> plugin;
 };
 
 /// A servo of the paper and what the paper and the model say of it.

@@ -24,6 +24,8 @@ std::size_t run_jobs(std::size_t count, const JobControl& control,
       if (index >= count) return;
       try {
         job(index);
+      } catch (const Interrupted&) {
+        return;
       } catch (...) {
         const std::scoped_lock lock(mutex);
         if (!error) error = std::current_exception();

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/experiment/log_replay.h"
-#include "ftcs/experiment/recorded_log.h"
+#include "ftcs/record/recorded_log.h"
 
 namespace ftcs::experiment {
 namespace {
@@ -86,7 +86,7 @@ TEST(RealLog, chrony_measurements_are_taken_as_they_stand) {
   ASSERT_GT(log.pairs.size(), 50U);
   EXPECT_NEAR(x_ns(log, 0), 504e3, 5e3);
   EXPECT_LT(std::abs(x_ns(log, log.pairs.size() - 1)), 1000.0);
-  EXPECT_NE(log.notes.at(1).find("cannot be rebuilt"), std::string::npos);
+  EXPECT_NE(log.replay_notes.at(1).find("cannot be rebuilt"), std::string::npos);
 }
 
 }  // namespace

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // World: files of a few hundred lines, written here; an oscillator 20 ppm fast, one message a
 // second.
-#include "ftcs/experiment/recorded_log.h"
+#include "ftcs/record/recorded_log.h"
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <tuple>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -51,7 +52,7 @@ TEST_F(RecordedLogTest, a_free_running_ptp4l_log_is_taken_as_it_stands) {
   EXPECT_EQ(x_ns(log, 0), 5000.0);
   EXPECT_EQ(x_ns(log, 9), 185'000.0);
   EXPECT_EQ(log.unusable, 1U);
-  EXPECT_NE(log.notes.front().find("s0 throughout"), std::string::npos);
+  EXPECT_NE(log.replay_notes.front().find("s0 throughout"), std::string::npos);
   EXPECT_EQ(log.interval_s, 1.0);
 }
 
@@ -219,11 +220,72 @@ TEST_F(RecordedLogTest, one_clock_of_a_mixed_journal_is_replayed_and_the_others_
   EXPECT_NE(wrong.error().text().find("no offsets of 'ts2phc'"), std::string::npos);
 }
 
-TEST_F(RecordedLogTest, a_log_of_summaries_alone_says_why_it_cannot_be_replayed) {
-  std::ofstream(path_) << "ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1\n";
-  const auto log = read_recorded_log(path_.string());
-  ASSERT_FALSE(log.ok());
-  EXPECT_NE(log.error().text().find("summary"), std::string::npos);
+// An oscillator 20 ppm fast and 10 ppb faster in every other second; what ptp4l said of itself
+// stays what it said.
+TEST_F(RecordedLogTest, summaries_give_the_oscillator_and_the_magnitudes_of_the_recorded_clock) {
+  std::string text = "phc2sys[9.9]: CLOCK_REALTIME rms 500 max 900 freq +1 +/- 3 delay 5 +/- 1\n";
+  for (int i = 0; i < 8; ++i) {
+    text += fmt::format("ptp4l[{}.001]: rms {} max 80 freq {:+} +/- 30 delay 1000 +/- 10\n", 10 + i,
+                        i % 2 == 0 ? 30 : 40, i % 2 == 0 ? 20'000 : 20'010);
+  }
+  const RecordedLog log = read(text);
+  EXPECT_EQ(log.source, "ptp4l");
+  ASSERT_EQ(log.pairs.size(), 8U);
+  EXPECT_NEAR(x_ns(log, 7), 4 * 20'010.0 + 3 * 20'000.0, 1e-6);
+  EXPECT_NE(log.replay_notes.at(1).find("lower limits"), std::string::npos);
+  const auto results = replay_log(log, {"adaptive"});
+  ASSERT_EQ(results.size(), 2U);
+  const ReplayResult& recorded = results[results[0].servo == kAsRecorded ? 0 : 1];
+  EXPECT_NEAR(recorded.rms_offset_ns, std::sqrt(0.5 * (30.0 * 30.0 + 40.0 * 40.0)), 1e-9);
+  EXPECT_EQ(recorded.max_offset_ns, 80.0);
+  EXPECT_TRUE(std::isnan(recorded.median_ns)) << "no summary tells it";
+}
+
+TEST_F(RecordedLogTest, summaries_beside_offsets_of_one_program_are_left_out) {
+  const RecordedLog log = read(
+      "ptp4l[10.0]: master offset 10 s2 freq +0 path delay 1000\n"
+      "ptp4l[11.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1\n"
+      "ptp4l[12.0]: master offset 20 s2 freq +0 path delay 1000\n"
+      "ptp4l[13.0]: master offset 30 s2 freq +0 path delay 1000\n");
+  EXPECT_EQ(log.used, 3U);
+  EXPECT_EQ(log.unusable, 1U);
+  EXPECT_TRUE(log.summaries.empty());
+}
+
+TEST_F(RecordedLogTest, chrony_tells_its_servers_and_reference_clocks_apart) {
+  std::string measurements;
+  std::string statistics;
+  std::string refclocks;
+  for (int i = 0; i < 4; ++i) {
+    for (const int server : {1, 2}) {  // the second one is 1 ms away
+      measurements += fmt::format(
+          "2026-01-02 03:04:{:02} 192.0.2.{} N 2 111 111 1111 4 4 0.10 {:e} 2e-4 1e-5 1e-4 7e-3 "
+          "CB00710F 4B D K\n",
+          5 + 16 * i - (i / 3) * 3, server, server == 1 ? -5e-6 : -1e-3);
+      statistics += fmt::format(
+          "2026-01-02 03:0{}:05 192.0.2.{} 6e-6 {:e} 2e-6 1e-6 1e-6 7.8e-02 16 0 8 0.00\n", i,
+          server, server == 1 ? 5e-6 : 1e-3);
+    }
+    refclocks += fmt::format("2026-01-02 03:04:{:02}.250000 PPS 7 N 1 4.9e-07 -5.0e-06 1e-06\n", i);
+    refclocks += fmt::format("2026-01-02 03:04:{:02}.500000 PPS - N - - -5.0e-06 1e-06\n", i);
+  }
+  for (const auto& [text, format, source] :
+       {std::tuple{statistics, "chrony statistics", "192.0.2.1"},
+        std::tuple{refclocks, "chrony refclocks", "PPS"}}) {
+    const RecordedLog log = read(text);
+    EXPECT_EQ(log.format, format);
+    EXPECT_EQ(log.source, source);
+    EXPECT_EQ(log.used, 4U);
+    EXPECT_NEAR(x_ns(log, 3), 5000.0, 1e-6) << format;
+  }
+  std::ofstream(path_) << measurements;
+  const auto second = read_recorded_log(path_.string(), "192.0.2.2");
+  ASSERT_TRUE(second.ok());
+  EXPECT_NEAR(x_ns(*second, 1), 1e6, 1e-6);
+  EXPECT_NE(second->notes.front().find("192.0.2.1 ("), std::string::npos);
+  const auto wrong = read_recorded_log(path_.string(), "192.0.2.3");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.error().text().find("no measurements of '192.0.2.3'"), std::string::npos);
 }
 
 // What ptp4l itself did stands beside the servos: here an offset of 300 ns for ever.

@@ -21,7 +21,7 @@ struct ScenarioServo {
   std::string name;
   ServoConfig config;
   bool clean_only = false;  ///< an oracle: it hears only messages that met nothing but jitter
-  std::shared_ptr<const ServoLibrary> library{};  ///< where somebody else wrote it
+  std::shared_ptr<const ServoLibrary> plugin{};  ///< where somebody else wrote it
 };
 
 /// The name of the known-noise Kalman filter: the last row of every comparison.

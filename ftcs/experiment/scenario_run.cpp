@@ -114,18 +114,18 @@ double ServoResult::share_within(double RunFigures::*figure, double limit) const
 }
 
 RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo, std::uint64_t seed,
-                        RunTrace* trace) {
+                        RunTrace* trace, const std::atomic<bool>* stop) {
   sim::TwoWaySpec world = scenario.world;
   std::vector<ServoInstance> instances;  // one a clock, until the end of the run
   for (auto& node : world.nodes) {
     node.discipline.servo = servo.config;
-    if (!servo.library) continue;
-    instances.emplace_back(*servo.library, servo.config);
+    if (!servo.plugin) continue;
+    instances.emplace_back(*servo.plugin, servo.config);
     node.discipline.servo.external = instances.back().config();
   }
   world.clean_only = servo.clean_only;
   if (trace != nullptr) trace->servo = servo.name;
-  FigureObserver observer(scenario, trace);
+  FigureObserver observer(scenario, trace, stop);
   if (scenario.network == "ptp") {
     sim::run_ptp_network(world, seed, observer);
   } else {
@@ -168,7 +168,8 @@ SweepResult run_sweep(const std::vector<Scenario>& scenarios, const Shard& shard
   std::vector<char> done(jobs.size(), 0);
   const std::size_t finished = run_jobs(jobs.size(), control, [&](std::size_t i) {
     const Scenario& scenario = scenarios[jobs[i].scenario];
-    figures[i] = run_scenario(scenario, scenario.servos[jobs[i].servo], jobs[i].seed);
+    figures[i] =
+        run_scenario(scenario, scenario.servos[jobs[i].servo], jobs[i].seed, nullptr, control.stop);
     done[i] = 1;
   });
   SweepResult result = empty_result(scenarios);

@@ -21,9 +21,11 @@ struct RunTrace {
   double interval_s = 1.0;         ///< of one cycle
 };
 
-/// One servo, one seed. Memory does not depend on the length unless a trace is asked for.
+/// One servo, one seed. Memory does not depend on the length unless a trace is asked for. Throws
+/// Interrupted once `stop` is set.
 [[nodiscard]] RunFigures run_scenario(const Scenario& scenario, const ScenarioServo& servo,
-                                      std::uint64_t seed, RunTrace* trace = nullptr);
+                                      std::uint64_t seed, RunTrace* trace = nullptr,
+                                      const std::atomic<bool>* stop = nullptr);
 
 /// A limit and what became of it.
 struct LimitResult {

@@ -184,8 +184,12 @@ baseline::KalmanNoise true_noise(const Scenario& scenario) {
   // A filter needs some noise: a picosecond is below what a timestamp can hold.
   constexpr double kLeastNoiseNs = 1e-3;
   baseline::KalmanNoise noise;
-  noise.forward_ns = std::max(std::hypot(jitter_sigma_ns(node.forward), stamps), kLeastNoiseNs);
-  noise.backward_ns = std::max(std::hypot(jitter_sigma_ns(node.backward), stamps), kLeastNoiseNs);
+  const auto link_ns = [&](const sim::LinkSpec& link) {
+    const double wave = link.wave ? link.wave->peak_to_peak_ns / 2.0 : 0.0;
+    return std::max(std::hypot(jitter_sigma_ns(link), wave, stamps), kLeastNoiseNs);
+  };
+  noise.forward_ns = link_ns(node.forward);
+  noise.backward_ns = link_ns(node.backward);
   noise.white_fm_1s = 0.0;
   noise.random_walk_fm_1s = 0.0;
   for (const auto& part : node.oscillator.parts) {
@@ -258,7 +262,7 @@ StepPolicy read_step_policy(TomlTable& clock) {
 ScenarioServo external_servo(std::shared_ptr<const ServoLibrary> library,
                              const Scenario& scenario) {
   ScenarioServo servo{library->name(), default_config(ServoKind::kExternal, scenario)};
-  servo.library = std::move(library);
+  servo.plugin = std::move(library);
   return servo;
 }
 

@@ -229,6 +229,14 @@ void read_load(TomlTable& table, sim::LinkSpec& link) {
   }
 }
 
+sim::StampWave read_wave(TomlTable wave) {
+  const auto peak_to_peak = wave.duration("peak_to_peak", kPositive);
+  const auto period = wave.duration("period", kPositive);
+  if (!peak_to_peak || !period) wave.fail_here("a wave needs peak_to_peak and period");
+  wave.finish();
+  return {peak_to_peak->ns(), period->seconds()};
+}
+
 void read_mishaps(TomlTable& table, sim::LinkSpec& link) {
   if (const auto v = table.ratio("loss", kProbability)) link.loss = *v;
   if (const auto v = table.ratio("duplication", kProbability)) link.duplication = *v;
@@ -254,6 +262,7 @@ void read_mishaps(TomlTable& table, sim::LinkSpec& link) {
 void read_link(TomlTable& table, sim::LinkSpec& link) {
   if (const auto v = table.duration("delay", kNotNegative)) link.delay = *v;
   if (auto jitter = table.table("jitter")) link.jitter = read_jitter(std::move(*jitter));
+  if (auto wave = table.table("wave")) link.wave = read_wave(std::move(*wave));
   read_load(table, link);
   read_mishaps(table, link);
 }

@@ -84,17 +84,27 @@ void enter_script(const std::string& path, ftcs_servo_functions& functions) {
   started = true;
   const Python python(path);
   // What the script made is kept: its callbacks must live as long as the program.
+  int refused = 1;
   const std::string code = fmt::format(
-      "import runpy, sys, traceback\n"
+      "import ctypes, os, runpy, sys, traceback\n"
+      // Else Python drops what a callback raises, and the run would go on without a servo.
+      "def ftcs_raised(what):\n"
+      "    traceback.print_exception(what.exc_type, what.exc_value, what.exc_traceback)\n"
+      "    print(f'ftcs: --servo {{ftcs_path}}: raised in a callback; no result', "
+      "file=sys.stderr)\n"
+      "    sys.stderr.flush()\n"
+      "    os._exit(1)\n"
+      "ftcs_path = {}\n"
+      "sys.unraisablehook = ftcs_raised\n"
       "try:\n"
-      "    ftcs_kept = runpy.run_path({}, run_name='ftcs_servo')\n"
+      "    ftcs_kept = runpy.run_path(ftcs_path, run_name='ftcs_servo')\n"
       "    ftcs_refused = ftcs_kept['ftcs_servo_entry']({}, {})\n"
+      "    ctypes.c_int.from_address({}).value = 1 if ftcs_refused else 0\n"
       "except BaseException:\n"
-      "    traceback.print_exc()\n"
-      "    raise RuntimeError from None\n"
-      "if ftcs_refused: raise RuntimeError\n",
-      python_path(path), FTCS_SERVO_ABI, reinterpret_cast<std::uintptr_t>(&functions));
-  if (!python.run(code)) {
+      "    traceback.print_exc()\n",
+      python_path(path), FTCS_SERVO_ABI, reinterpret_cast<std::uintptr_t>(&functions),
+      reinterpret_cast<std::uintptr_t>(&refused));
+  if (!python.run(code) || refused != 0) {
     fail(path, fmt::format("its ftcs_servo_entry({}, address) failed or is not there; Python's own "
                            "words stand above",
                            FTCS_SERVO_ABI));
@@ -128,6 +138,28 @@ void ServoLibrary::check(const std::string& path) const {
       functions_.reset == nullptr || functions_.update == nullptr) {
     fail(path, "its table needs create, destroy, reset and update");
   }
+}
+
+void ServoLibrary::add(const ExternalTally& tally) const noexcept {
+  messages_ += tally.messages;
+  commands_ += tally.commands;
+  unsound_ += tally.unsound;
+}
+
+std::string ServoLibrary::doubt() const {
+  if (unsound_ > 0) {
+    return fmt::format(
+        "{}: expected finite commands with a correction time of at least 0, {} of {} "
+        "were not and were not obeyed",
+        name_, unsound_.load(), unsound_ + commands_);
+  }
+  if (messages_ == 0 || commands_ > 0) return {};
+  return fmt::format("{}: gave no command in {} messages, its clock ran free", name_,
+                     messages_.load());
+}
+
+ServoInstance::~ServoInstance() {
+  if (tally_) library_->add(*tally_);
 }
 
 ServoInstance::ServoInstance(const ServoLibrary& library, const ServoConfig& common)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -24,11 +26,20 @@ class ServoLibrary {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const ftcs_servo_functions& functions() const noexcept { return functions_; }
 
+  /// Why the figures of its finished runs are not those of a servo, in a sentence; empty: it gave
+  /// commands, and all could be obeyed.
+  [[nodiscard]] std::string doubt() const;
+  /// What came of a finished run; any thread.
+  void add(const ExternalTally& tally) const noexcept;
+
  private:
   void check(const std::string& path) const;
 
   ftcs_servo_functions functions_{};
   std::string name_;
+  mutable std::atomic<std::uint64_t> messages_ = 0;
+  mutable std::atomic<std::uint64_t> commands_ = 0;
+  mutable std::atomic<std::uint64_t> unsound_ = 0;
 };
 
 /// One instance, for one run of one clock; ends with this object. The library must outlive it.
@@ -36,17 +47,22 @@ class ServoInstance {
  public:
   /// Throws std::runtime_error if the library makes none.
   ServoInstance(const ServoLibrary& library, const ServoConfig& common);
+  ServoInstance(ServoInstance&&) noexcept = default;
+  ServoInstance& operator=(ServoInstance&&) = delete;
+  ~ServoInstance();
 
   [[nodiscard]] ExternalConfig config() const noexcept {
     ExternalConfig config;
     config.functions = &library_->functions();
     config.instance = instance_.get();
+    config.tally = tally_.get();
     return config;
   }
 
  private:
   const ServoLibrary* library_;
   std::unique_ptr<void, void (*)(void*)> instance_;
+  std::unique_ptr<ExternalTally> tally_ = std::make_unique<ExternalTally>();
 };
 
 }  // namespace ftcs::experiment

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include "ftcs/experiment/two_machines_world.h"
+#include "ftcs/time/relabel.h"
+
 namespace ftcs::experiment {
 namespace {
 
@@ -43,6 +46,23 @@ TEST(TwoMachines, draw_a_circle_as_one_does) {
   const TwoMachinesRun two = run_two_machines(world(), MachineMode::kExternal, 1);
   EXPECT_LT(one.contour_rms_um, 1.0);
   EXPECT_LT(two.contour_rms_um, 1.1 * one.contour_rms_um);
+}
+
+/// Stamps of 8 ns on a quiet path are the same again and again and then jump by a tick: nothing
+/// that a receiver may take for a jump of the clock. Crystals up to 200 ppm off, a minute of each.
+TEST(TwoMachines, have_receivers_that_keep_their_lock_with_stamps_of_8_ns) {
+  TwoMachinesWorld coarse = world();
+  coarse.crystal_ppm = 200.0;
+  for (std::uint64_t seed = 451; seed <= 480; ++seed) {
+    PlantMachine machine(coarse, node::BusMode::kExternal, true, seed, seed / 2 % 2);
+    for (int sixteenth = 0; sixteenth < 60 * 16; ++sixteenth) {
+      const sim::TrueTime now{Duration::from_ns(62.5e6 * sixteenth)};
+      machine.receiver().advance(now);
+      const auto shown = machine.host().shown_at(relabel<ethercat::WireTime>(now));
+      const bool locked = machine.receiver().at(shown).has_value();
+      EXPECT_TRUE(locked || sixteenth < 2 * 16) << seed << " at " << now.since_epoch().seconds();
+    }
+  }
 }
 
 TEST(TwoMachines, are_the_same_for_the_same_seed) {

@@ -38,6 +38,9 @@ constexpr std::uint32_t kSaturatedFrom = 8;
 constexpr double kUnknownRate = 500e-6;
 constexpr double kKnownRate = 1e-6;
 
+// Syncs in a row whose offset is refused: the reference was set while it was not heard.
+constexpr std::uint32_t kRefusedToBegin = 16;
+
 constexpr bool is_power_of_two(std::uint32_t times) noexcept { return (times & (times - 1)) == 0; }
 
 Note note(NoteKind kind) noexcept {
@@ -115,6 +118,8 @@ void ClockFollower::note_refusals(const Telemetry& telemetry) noexcept {
   refused.offset = telemetry.servo.offset;
   refused.times = refused_offsets_;
   tell(refused);
+  const bool may_step = config_.discipline.step.permits(true);
+  if (may_step && refused_offsets_ == kRefusedToBegin) on_reference_jump(-telemetry.servo.offset);
 }
 
 void ClockFollower::note_saturation(const Telemetry& telemetry, bool at_limit) noexcept {
@@ -248,7 +253,9 @@ void ClockFollower::on_reference_jump(Duration jump) noexcept {
   forget_stamps();
   Note jumped = note(NoteKind::kReferenceJumped);
   jumped.jump = jump;
-  jumped.plan = discipline_.on_reference_jump(jump);
+  jumped.plan.response = JumpResponse::kRefused;
+  jumped.gated = gate_ != nullptr && !gate_->admits_change(jump);
+  if (!jumped.gated) jumped.plan = discipline_.on_reference_jump(jump);
   tell(jumped);
 }
 

@@ -26,6 +26,7 @@ ethercat::MainDeviceConfig CycleNode::main_config(const CycleNodeConfig& config,
   ethercat::MainDeviceConfig result = config.main;
   const std::size_t used = config.sync_error_limit ? kObjects : kObjects - 1;
   result.process.objects = std::span{objects}.first(used);
+  result.needs_reference = config.bus_mode != BusMode::kFollow;
   result.process.cycle = config.servo.cycle;
   const auto phase = config.sync0_phase * static_cast<double>(config.servo.cycle.count());
   result.process.sync0_shift = config.servo.shift + Nanoseconds{static_cast<std::int64_t>(phase)};
@@ -52,6 +53,7 @@ CycleNode::CycleNode(const CycleNodeConfig& config) noexcept
       clocks_(config.difference_limit) {}
 
 const CycleDecision& CycleNode::start(FreeRunningTime now) noexcept {
+  bridge_.start(main_.network().bridge == main_.network().reference);
   decision_ = servo_.start(now);
   return decision_;
 }
@@ -89,9 +91,10 @@ const CycleDecision& CycleNode::end_cycle(bool answered, const ethercat::FrameSt
   sample_.has_received = answered;
   sample_.has_reference = answered && main_.last_cycle().has_reference;
   sample_.reference = main_.last_cycle().reference;
-  if (config_.bus_mode == BusMode::kLead && sample_.has_reference) lead(stamps);
+  const auto plant = plant_at_reference(answered, stamps);
+  if (config_.bus_mode == BusMode::kLead && sample_.has_reference && plant) lead(*plant);
   decision_ = servo_.update(sample_, now);
-  watch_bus(answered, stamps);
+  watch_bus(answered, plant);
   const bool ready =
       config_.bus_mode == BusMode::kFollow || bus_.decision().state == BusClockState::kLocked;
   supervision_.cycle(main_, decision_.state, ready, notes_);
@@ -106,25 +109,45 @@ bool CycleNode::settled() const noexcept {
   return op >= 0 && (cycles - op) * config_.servo.cycle.count() > 1'000'000'000;
 }
 
+/// Plant time when this cycle's frame passed the reference.
+std::optional<ReferenceTime> CycleNode::plant_at_reference(
+    bool answered, const ethercat::FrameStamps& stamps) noexcept {
+  const ethercat::Network& network = main_.network();
+  if (!config_.main.process.bridge) {
+    if (!stamps.has_system_time) return std::nullopt;
+    return stamps.system_time + Duration{config_.servo.transit};
+  }
+  // After a lost frame the register is not certain, and an older one's figures are not this
+  // frame's.
+  if (!sample_.has_reference || !offset_certain_) return std::nullopt;
+  bridge_.on_frame(relabel<LocalTime>(sample_.reference), bus_offset_ns_);
+  const ethercat::ConstBytes inputs = main_.inputs(network.bridge);
+  const bool there = answered && main_.takes_part(network.bridge) &&
+                     main_.last_cycle().inputs_valid &&
+                     inputs.size() >= ethercat::bridge::kInputSize;
+  if (there) bridge_.on_inputs(ethercat::bridge::Inputs::decode(inputs));
+  return bridge_.plant(bus_.decision().tracking);
+}
+
 /// It is plant time that the cycle follows, as long as the drives are there too: should plant time
 /// stay away, or jump, the cycle stays with its drives.
-void CycleNode::lead(const ethercat::FrameStamps& stamps) noexcept {
-  if (!stamps.has_system_time) return;
-  const ReferenceTime plant = stamps.system_time + Duration{config_.servo.transit};
+void CycleNode::lead(ReferenceTime plant) noexcept {
   const LocalTime drives = relabel<LocalTime>(sample_.reference);
   if (abs(offset_from_reference(drives, plant)) < Duration{kLeadBand}) sample_.reference = plant;
 }
 
-void CycleNode::watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept {
+void CycleNode::watch_bus(bool answered, std::optional<ReferenceTime> plant) noexcept {
   using Kind = CycleNote::Kind;
   const ethercat::CycleReport& report = main_.last_cycle();
   BusClockSample sample;
-  // The servo's gates know a stamp that is wrong; after a lost frame the register is not certain.
+  // The servo's gates know a stamp of the host that is wrong; after a lost frame the register is
+  // not certain.
+  const bool trusted =
+      config_.main.process.bridge.has_value() || decision_.verdict == CycleVerdict::kUsed;
   sample.has_dc = answered && report.has_reference && offset_certain_;
-  sample.usable =
-      sample.has_dc && stamps.has_system_time && decision_.verdict == CycleVerdict::kUsed;
+  sample.usable = sample.has_dc && plant.has_value() && trusted;
   sample.dc = relabel<LocalTime>(report.reference);
-  sample.plant = stamps.system_time + Duration{config_.servo.transit};
+  sample.plant = plant.value_or(ReferenceTime{});
   sample.offset_ns = bus_offset_ns_;
   const BusClockState before = bus_.decision().state;
   bus_offset_ns_ = bus_.decision().offset_ns;  // this frame has written it

@@ -10,6 +10,7 @@
 #include "ftcs/discipline/cycle_servo.h"
 #include "ftcs/ethercat/maindevice/csp_profile.h"
 #include "ftcs/ethercat/maindevice/main_device.h"
+#include "ftcs/node/bridge_clock.h"
 #include "ftcs/node/cycle_notes.h"
 #include "ftcs/node/drive_axes.h"
 #include "ftcs/node/drive_clocks.h"
@@ -32,7 +33,8 @@ enum class BusWrite : std::uint8_t {
 };
 
 struct CycleNodeConfig {
-  /// Its process.objects, cycle and sync0_shift are set by the node.
+  /// Its process.objects, cycle and sync0_shift are set by the node. Where process.bridge has a
+  /// value, plant time is that of a bridge terminal, whatever the stamps of the frames bring.
   ethercat::MainDeviceConfig main;
   CycleServoConfig servo;
   double sync0_phase =
@@ -119,15 +121,18 @@ class CycleNode {
                                                               const Objects& objects) noexcept;
   [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
   void write_time(FreeRunningTime now, ReferenceTime plant) noexcept;
-  void lead(const ethercat::FrameStamps& stamps) noexcept;
+  [[nodiscard]] std::optional<ReferenceTime> plant_at_reference(
+      bool answered, const ethercat::FrameStamps& stamps) noexcept;
+  void lead(ReferenceTime plant) noexcept;
   [[nodiscard]] bool settled() const noexcept;
-  void watch_bus(bool answered, const ethercat::FrameStamps& stamps) noexcept;
+  void watch_bus(bool answered, std::optional<ReferenceTime> plant) noexcept;
 
   CycleNodeConfig config_;
   Objects objects_;
   ethercat::MainDevice main_;
   CycleServo servo_;
   BusClock bus_;
+  BridgeClock bridge_;
   DriveAxes axes_;
   DriveSupervision supervision_;
   DriveClocks clocks_;

@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/node/drive_axes.h"
 
-#include <algorithm>
-
 namespace ftcs::node {
 
 using ethercat::AxisState;
 
-bool DriveAxes::all_enabled(std::size_t count) const noexcept {
-  return std::all_of(
-      axes_.begin(), axes_.begin() + static_cast<std::ptrdiff_t>(count),
-      [](const ethercat::CspAxis& axis) { return axis.state() == AxisState::kEnabled; });
+namespace {
+/// Its process data is that of csp_objects(); a bridge terminal's is not.
+bool is_axis(ethercat::MainDevice& main, std::size_t n) noexcept {
+  return main.outputs(n).size() >= ethercat::csp::kOutputSize &&
+         main.inputs(n).size() >= ethercat::csp::kInputSize;
+}
+}  // namespace
+
+bool DriveAxes::all_enabled(ethercat::MainDevice& main) const noexcept {
+  for (std::size_t n = 0; n < main.network().count; ++n) {
+    if (is_axis(main, n) && axes_[n].state() != AxisState::kEnabled) return false;
+  }
+  return true;
 }
 
 /// The axis is in Fault, a reset is left to it, and the last one is long enough ago to have failed.
@@ -25,12 +32,11 @@ void DriveAxes::cycle(ethercat::MainDevice& main, bool in_op, double time_s,
                       CycleNotes& notes) noexcept {
   const std::size_t count = main.network().count;
   const bool moving = in_op && config_.move;
-  path_.advance(moving && all_enabled(count), time_s);
+  path_.advance(moving && all_enabled(main), time_s);
   for (std::size_t n = 0; n < count; ++n) {
+    if (!is_axis(main, n)) continue;
     const auto outputs = main.outputs(n);
     const auto inputs = main.inputs(n);
-    if (outputs.size() < ethercat::csp::kOutputSize) continue;
-    if (inputs.size() < ethercat::csp::kInputSize) continue;
     if (!main.takes_part(n)) axes_[n].restart();
     const AxisState before = axes_[n].state();
     const bool reset = take_reset(n, moving && before == AxisState::kFault);

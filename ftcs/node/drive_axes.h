@@ -42,7 +42,7 @@ class DriveAxes {
   [[nodiscard]] const CirclePath& path() const noexcept { return path_; }
 
  private:
-  [[nodiscard]] bool all_enabled(std::size_t count) const noexcept;
+  [[nodiscard]] bool all_enabled(ethercat::MainDevice& main) const noexcept;
   [[nodiscard]] bool take_reset(std::size_t n, bool fault) noexcept;
 
   DriveAxesConfig config_;

@@ -79,6 +79,9 @@ void DriveSupervision::bring_to_op(ethercat::MainDevice& main, bool locked, bool
     notes.add(Kind::kOpRequested);
   }
   const std::uint64_t since = cycles_ - asked_at_;
+  if (op_cycle_ < 0 && config_.op_limit > 0 && since >= config_.op_limit) {
+    return main.stop(FailureKind::kNeverOperational);
+  }
   if (since < config_.first_recovery || since % config_.recovery_interval != 0) return;
   for (std::size_t n = 0; n < main.network().count; ++n) main.recover(n);
 }

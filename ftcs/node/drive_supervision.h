@@ -30,6 +30,9 @@ struct DriveSupervisionConfig {
   /// From asking for OP to the first recovery of a drive that is not in it, and between two.
   std::uint64_t first_recovery = 1000;
   std::uint64_t recovery_interval = 100;
+  /// From asking for OP to the first cycle with all in it, else everything is stopped: a drive that
+  /// is asked again and again may never be able to. Zero: asked for ever.
+  std::uint64_t op_limit = 30'000;
 };
 
 /// When drives are asked for OP, helped back into it and stopped: SAFEOP to OP waits for the lock

@@ -48,6 +48,7 @@ struct Note {
   ClockError error{};
   Duration jump{};  ///< of the reference, positive: ahead
   JumpPlan plan{};
+  bool gated = false;  ///< the ReferenceGate does not admit that jump
 };
 
 using FollowerEvent = std::variant<Steered, Note>;

@@ -4,15 +4,16 @@
 // shows true time plus 5 s; its clock starts 1 us ahead.
 #include "ftcs/node/receiver_node.h"
 
+#include <algorithm>
 #include <functional>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/receiver_fixture.h"
 #include "test/support/forbid_allocation.h"
 #include "test/support/manual_source.h"
+#include "test/support/receiver_fixture.h"
 #include "test/support/watched_clock.h"
 
 namespace ftcs::node {
@@ -73,7 +74,8 @@ class Node : public testing::Test {
     at(sent + kDelay);
     node->on_event_message(bytes_of(sync_from(who, sequence)).view(), local(now), local(now));
     take();
-    general(message_from(who, sequence++, ptp::FollowUp{reference(sent)}), sent + 2 * kDelay);
+    general(message_from(who, sequence++, ptp::FollowUp{reference(sent + reference_ahead)}),
+            sent + 2 * kDelay);
   }
   /// What timers are due, and an answer to what they asked.
   void timers(Nanoseconds until) {
@@ -88,7 +90,8 @@ class Node : public testing::Test {
     const Nanoseconds sent = now;
     node->on_transmit_timestamp(id, local(sent), local(sent + 1us));
     take();
-    general(message_from(kA, id.sequence_id, ptp::DelayResp{reference(sent + kDelay), kUs}),
+    general(message_from(kA, id.sequence_id,
+                         ptp::DelayResp{reference(sent + reference_ahead + kDelay), kUs}),
             sent + 3 * kDelay);
   }
   void cycles(int count) {
@@ -123,7 +126,9 @@ class Node : public testing::Test {
     return result;
   }
   [[nodiscard]] double error_ns() {
-    return (clock->local_at(source.instant).since_epoch() - reference(now).since_epoch()).ns();
+    return (clock->local_at(source.instant).since_epoch() -
+            reference(now + reference_ahead).since_epoch())
+        .ns();
   }
 
   ReceiverNodeConfig config;
@@ -136,6 +141,7 @@ class Node : public testing::Test {
   std::uint16_t sequence = 0;
   Nanoseconds now{};
   Nanoseconds start{};
+  Nanoseconds reference_ahead{};
   int beats = 0;
 };
 
@@ -238,6 +244,98 @@ TEST_F(Node, a_jump_of_the_reference_is_told_and_begins_anew) {
   }
   EXPECT_EQ(places<ptp::ReferenceJumped>().size(), 1U);
   EXPECT_EQ(node->discipline().counters().new_references, 1U);
+}
+
+class SilentNode : public Node, public testing::WithParamInterface<Nanoseconds> {
+ protected:
+  /// Locked, then nothing is heard for so long, then a reference that was set meanwhile.
+  void return_after_silence(StepMode mode) {
+    config.port.fast_start = true;
+    config.follower.discipline.largest_offset = 1s;
+    config.follower.discipline.step.mode = mode;
+    lock();
+    const Nanoseconds back = now + GetParam();
+    timers(back);
+    node->on_silence(local(back));
+    take();
+    events.clear();
+    reference_ahead = 5s;
+    start = back;
+    announce(kA, start);
+    cycles(80);
+  }
+  [[nodiscard]] std::vector<Note> notes(NoteKind kind) const {
+    std::vector<Note> found;
+    for (const ReceiverEvent& event : events) {
+      const auto* note = std::get_if<Note>(&event);
+      if (note != nullptr && note->kind == kind) found.push_back(*note);
+    }
+    return found;
+  }
+};
+
+// It was refused for ever.
+TEST_P(SilentNode,
+       a_reference_that_was_set_while_it_was_silent_is_stepped_to_where_that_is_permitted) {
+  return_after_silence(StepMode::kFirst);
+  EXPECT_TRUE(node->locked());
+  EXPECT_NEAR(error_ns(), 0.0, 1'000.0);
+  EXPECT_EQ(node->discipline().counters().steps, 1U);
+  for (const ReceiverEvent& event : events) {
+    if (const auto* action = std::get_if<ptp::Action>(&event);
+        action != nullptr && std::holds_alternative<ptp::ReferenceJumped>(*action)) {
+      return;
+    }
+  }
+  const auto jumped = notes(NoteKind::kReferenceJumped);
+  ASSERT_EQ(jumped.size(), 1U);
+  EXPECT_EQ(jumped[0].plan.response, JumpResponse::kStepped);
+  EXPECT_NEAR(jumped[0].jump.seconds(), 5.0, 1e-3);
+}
+
+TEST_P(SilentNode, a_reference_that_was_set_while_it_was_silent_is_refused_aloud_where_it_is_not) {
+  return_after_silence(StepMode::kNever);
+  EXPECT_FALSE(node->locked());
+  EXPECT_EQ(node->discipline().counters().steps, 0U);
+  EXPECT_NEAR(error_ns(), -5e9, 1e6);
+  EXPECT_GE(notes(NoteKind::kOffsetRefused).size(), 3U);
+}
+
+// Shorter than a ninth of the silence is no jump against the oscillator.
+INSTANTIATE_TEST_SUITE_P(Silence, SilentNode, testing::Values(8s, 60s, 3600s));
+
+/// Admits no change of more than a second.
+class GateOfChanges final : public ReferenceGate {
+ public:
+  bool admits(ReferenceTime, FreeRunningTime) noexcept override { return true; }
+  bool admits_change(Duration change) const noexcept override {
+    return abs(change) <= Duration{1s};
+  }
+};
+
+// It was "stepped there", and then not followed.
+TEST_F(Node, a_jump_that_the_gate_does_not_admit_is_not_said_to_be_followed) {
+  GateOfChanges gate;
+  config.follower.discipline.largest_offset = 1s;
+  config.follower.discipline.step.mode = StepMode::kFirst;
+  begin();
+  node.emplace(config, *clock, &gate);
+  node->start(local(0s));
+  announce(kA, 0s);
+  announce(kA, 250ms);
+  start = 250ms;
+  cycles(80);
+  events.clear();
+  reference_ahead = 2s;
+  cycles(12);
+  const auto told = places<Note>();
+  const auto jumped = std::find_if(told.begin(), told.end(), [this](std::size_t place) {
+    return std::get<Note>(events[place]).kind == NoteKind::kReferenceJumped;
+  });
+  ASSERT_NE(jumped, told.end());
+  const Note& note = std::get<Note>(events[*jumped]);
+  EXPECT_TRUE(note.gated);
+  EXPECT_EQ(note.plan.response, JumpResponse::kRefused);
 }
 
 // Eight forged frames ended the program; a better word of oneself was worth any time.

@@ -13,6 +13,9 @@ class ReferenceGate {
   virtual ~ReferenceGate() = default;
   /// `event`: the same instant on the free-running oscillator.
   [[nodiscard]] virtual bool admits(ReferenceTime reference, FreeRunningTime event) noexcept = 0;
+  /// Whether the reference may advance by so much more than the oscillator, as far as that alone
+  /// says.
+  [[nodiscard]] virtual bool admits_change(Duration) const noexcept { return true; }
 
  protected:
   ReferenceGate() = default;

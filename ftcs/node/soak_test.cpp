@@ -12,9 +12,9 @@
 
 #include "ftcs/clock/virtual_clock.h"
 #include "ftcs/node/receiver_node.h"
-#include "ftcs/ptp/receiver_fixture.h"
 #include "test/support/forbid_allocation.h"
 #include "test/support/manual_source.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::node {
 namespace {
@@ -24,6 +24,7 @@ using ptp::Message;
 using ptp::MessageBytes;
 using ptp::PortIdentity;
 using ptp::receiver_test::announce_from;
+using ptp::receiver_test::bytes_of;
 using ptp::receiver_test::kA;
 using ptp::receiver_test::kB;
 using ptp::receiver_test::kUs;
@@ -35,8 +36,6 @@ constexpr Nanoseconds kInterval{7'812'500};
 constexpr Nanoseconds kDelay{10'000};
 constexpr double kFast = 20e-6;
 constexpr int kSyncs = 20 * 60 * 128;
-
-MessageBytes octets(const Message& message) { return *ptp::encode(message); }
 
 class Soak : public testing::Test {
  protected:
@@ -86,18 +85,18 @@ class Soak : public testing::Test {
     for (std::size_t i = 0; i < count; ++i) {
       node_->on_transmit_timestamp(asked[i], local(at), local(at));
       while (node_->next()) continue;
-      const auto answer = octets(message_from(
+      const auto answer = bytes_of(message_from(
           kA, asked[i].sequence_id, ptp::DelayResp{reference(at + kDelay + jitter()), kUs}));
       node_->on_general_message(answer.view(), local(at + 3 * kDelay));
       while (node_->next()) continue;
     }
   }
   void true_messages(int n, Nanoseconds sent) {
-    if (n % 128 == 0) general(octets(announce_from(kA)).view(), sent);
+    if (n % 128 == 0) general(bytes_of(announce_from(kA)).view(), sent);
     Message sync = sync_from(kA, sequence_);
     sync.header.log_interval = -7;
-    const auto sync_octets = octets(sync);
-    const auto follow = octets(message_from(kA, sequence_, ptp::FollowUp{reference(sent)}));
+    const auto sync_octets = bytes_of(sync);
+    const auto follow = bytes_of(message_from(kA, sequence_, ptp::FollowUp{reference(sent)}));
     event(sync_octets, sent + kDelay + jitter());
     general(follow.view(), sent + 3 * kDelay);
     kept_[static_cast<std::size_t>(n) % kept_.size()] = {sync_octets, follow};
@@ -108,11 +107,11 @@ class Soak : public testing::Test {
     switch (any(9)) {
       case 0: {
         const auto forged = message_from(kA, ahead(any(3)), ptp::Sync{reference(at + 1h)});
-        return event(octets(forged), at);
+        return event(bytes_of(forged), at);
       }
       case 1:
         return general(
-            octets(message_from(kA, ahead(1), ptp::FollowUp{reference(at + 300us)})).view(), at);
+            bytes_of(message_from(kA, ahead(1), ptp::FollowUp{reference(at + 300us)})).view(), at);
       case 2: {
         const auto& old = kept_[static_cast<std::size_t>(n + 1) % kept_.size()];
         event(old.first, at);
@@ -121,22 +120,22 @@ class Soak : public testing::Test {
       case 3: {
         Message better = announce_from(kB, 1);
         better.header.log_interval = 7;
-        return general(octets(better).view(), at);
+        return general(bytes_of(better).view(), at);
       }
       case 4:
-        return event(octets(message_from(kB, ahead(7), ptp::Sync{reference(at + 10s)})), at);
+        return event(bytes_of(message_from(kB, ahead(7), ptp::Sync{reference(at + 10s)})), at);
       case 5: {
         Message response = message_from(kA, static_cast<std::uint16_t>(any(65'536)),
                                         ptp::DelayResp{reference(at + 1ms), kUs});
         response.header.log_interval = 7;
-        return general(octets(response).view(), at);
+        return general(bytes_of(response).view(), at);
       }
       case 6:
-        return event(octets(sync_from(kA, ahead(12))), at);
+        return event(bytes_of(sync_from(kA, ahead(12))), at);
       case 7: {
         Message corrected = message_from(kA, ahead(1), ptp::Sync{reference(at)});
         corrected.header.correction = Duration{any(2) == 0 ? 999ms : -999ms};
-        return event(octets(corrected), at);
+        return event(bytes_of(corrected), at);
       }
       default:
         break;

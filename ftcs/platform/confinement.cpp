@@ -273,14 +273,27 @@ void choose(std::span<const int> capabilities) {
   }
 }
 
+/// Whether the process has a right that it is not to keep. Of what capng_get_caps_process() found.
+bool has_more_than(std::span<const int> kept) {
+  for (int capability = 0; capability <= CAP_LAST_CAP; ++capability) {
+    const bool has = capng_have_capability(CAPNG_PERMITTED, static_cast<unsigned>(capability)) != 0;
+    if (has && std::find(kept.begin(), kept.end(), capability) == kept.end()) return true;
+  }
+  return false;
+}
+
 std::optional<std::string> keep_capabilities(const Confinement& confinement) {
   std::vector<int> kept = confinement.capabilities;
   if (confinement.will_change_user) kept.insert(kept.end(), {CAP_SETUID, CAP_SETGID, CAP_SETPCAP});
   capng_get_caps_process();
   const bool bounds = capng_have_capability(CAPNG_EFFECTIVE, CAP_SETPCAP) != 0;
+  // A service whose unit left it just these needs no call, and its unit may allow none.
+  const bool gives_up = has_more_than(kept);
   choose(kept);
   if (bounds) (void)capng_apply(CAPNG_SELECT_BOUNDS);
-  if (capng_apply(CAPNG_SELECT_CAPS) != 0) return failed("keeping few capabilities", errno);
+  if (gives_up && capng_apply(CAPNG_SELECT_CAPS) != 0) {
+    return failed("keeping few capabilities", errno);
+  }
   // What a service manager made ambient is not handed on either.
   (void)::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0);
   return std::nullopt;

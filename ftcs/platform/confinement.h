@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <linux/capability.h>  // CAP_..., for who says which rights it needs
 #include <optional>
 #include <string>
 #include <vector>

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_clocks.h"
+#include "test/support/fake_clocks.h"
 
 namespace ftcs::platform {
 namespace {

@@ -13,8 +13,10 @@ namespace ftcs::platform {
 namespace {
 
 /// errno of the first call that failed, or 0.
-int write_and_sync(int file, std::string_view content) {
+int write_and_sync(int file, std::string_view content, Readers readers) {
+  constexpr mode_t kReadable = 0644;
   int code = 0;
+  if (readers == Readers::kEverybody && ::fchmod(file, kReadable) != 0) code = errno;
   while (!content.empty() && code == 0) {
     const ssize_t written = ::write(file, content.data(), content.size());
     if (written >= 0) {
@@ -55,22 +57,24 @@ int name_part(int file, const std::string& path, std::string& part) {
 /// Into a file without a name: a process that is killed while it writes leaves nothing behind.
 /// errno, or 0; `part` is the name that it has at the end. Not every file system has such files,
 /// and naming one needs /proc.
-int write_unnamed(const std::string& path, std::string_view content, std::string& part) {
+int write_unnamed(const std::string& path, std::string_view content, Readers readers,
+                  std::string& part) {
   const int file = ::open(folder_of(path).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
   if (file < 0) return errno;
-  int code = write_and_sync(file, content);
+  int code = write_and_sync(file, content, readers);
   if (code == 0) code = name_part(file, path, part);
   // Once more: btrfs synchronises nothing of a file that has no name.
   if (code == 0 && ::fsync(file) != 0) code = errno;
   return close_after(file, code);
 }
 
-int write_named(const std::string& path, std::string_view content, std::string& part) {
+int write_named(const std::string& path, std::string_view content, Readers readers,
+                std::string& part) {
   std::string name = path + ".XXXXXX";
   const int file = ::mkostemp(name.data(), O_CLOEXEC);
   if (file < 0) return errno;
   part = std::move(name);
-  return close_after(file, write_and_sync(file, content));
+  return close_after(file, write_and_sync(file, content, readers));
 }
 
 void sync_folder_of(const std::string& path) {
@@ -83,14 +87,15 @@ void sync_folder_of(const std::string& path) {
 
 }  // namespace
 
-std::optional<std::string> write_durably(const std::string& path, std::string_view content) {
+std::optional<std::string> write_durably(const std::string& path, std::string_view content,
+                                         Readers readers) {
   const auto failure = [&path](int code) {
     return "cannot write " + path + ": " + std::generic_category().message(code);
   };
   if (!may_be_replaced(path)) return "cannot write " + path + ": it is no regular file";
   std::string part;
-  int code = write_unnamed(path, content, part);
-  if (code != 0 && part.empty()) code = write_named(path, content, part);
+  int code = write_unnamed(path, content, readers, part);
+  if (code != 0 && part.empty()) code = write_named(path, content, readers, part);
   if (code == 0 && ::rename(part.c_str(), path.c_str()) != 0) code = errno;
   if (code != 0) {
     if (!part.empty()) (void)::unlink(part.c_str());

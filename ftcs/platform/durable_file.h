@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -8,13 +9,17 @@
 
 namespace ftcs::platform {
 
+enum class Readers : std::uint8_t { kOwner, kEverybody };
+
 /// Replaces the file `path` by `content` so that at any moment, a crash or loss of power included,
 /// either the old or the new content is there: written to a file without a name (or, where that
 /// cannot be had or named, of a temporary name beside it), synchronised, named, renamed, the folder
 /// synchronised. What exists at `path` must be a regular file: a device, a pipe or a link is not
-/// replaced. Returns what failed, with the system's reason.
+/// replaced. Whatever the umask is, the new file has the mode of `readers`. Returns what failed,
+/// with the system's reason.
 [[nodiscard]] std::optional<std::string> write_durably(const std::string& path,
-                                                       std::string_view content);
+                                                       std::string_view content,
+                                                       Readers readers = Readers::kOwner);
 
 /// A regular file that is open, whatever stands at its name by now; anything else stays as it is.
 /// False with errno: it could not be cut.

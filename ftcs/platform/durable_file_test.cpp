@@ -36,6 +36,19 @@ TEST_F(DurableFile, replaces_the_old_content_and_leaves_nothing_beside_it) {
   EXPECT_EQ(files(), 1);
 }
 
+// A collector of metrics is another user than the one who writes them, as a service with a umask.
+TEST_F(DurableFile, may_be_read_by_everybody_where_that_is_asked_for) {
+  using std::filesystem::perms;
+  const mode_t before = ::umask(077);
+  EXPECT_EQ(write_durably(folder_ / "a", "one", Readers::kEverybody), std::nullopt);
+  EXPECT_EQ(write_durably(folder_ / "b", "one"), std::nullopt);
+  ::umask(before);
+  const perms own = perms::owner_read | perms::owner_write;
+  EXPECT_EQ(std::filesystem::status(folder_ / "a").permissions(),
+            own | perms::group_read | perms::others_read);
+  EXPECT_EQ(std::filesystem::status(folder_ / "b").permissions(), own);
+}
+
 TEST_F(DurableFile, a_failure_names_the_file_and_costs_nothing) {
   const auto missing = write_durably(folder_ / "none" / "a", "x");
   ASSERT_TRUE(missing.has_value());

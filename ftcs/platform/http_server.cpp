@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kWorkers = 8;
 constexpr int kMostListeners = 4;  // of events: each keeps a worker
 constexpr time_t kPatience_s = 2;
+constexpr time_t kIdle_s = 1;  // a connection that is kept open keeps a worker
 
 HttpRequest request_of(const httplib::Request& request) {
   return {request.get_header_value("Accept"), request.get_header_value("Origin"),
@@ -79,6 +80,7 @@ HttpServer::HttpServer() : implementation_(std::make_unique<Implementation>()) {
   server.set_read_timeout(kPatience_s, 0);
   server.set_write_timeout(kPatience_s, 0);
   server.set_keep_alive_max_count(100);
+  server.set_keep_alive_timeout(kIdle_s);
   server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     if (request.method == "GET" || request.method == "HEAD") {
       return httplib::Server::HandlerResponse::Unhandled;

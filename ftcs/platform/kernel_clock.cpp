@@ -228,6 +228,7 @@ void KernelClock::check_rate() noexcept {
   if (std::abs(found->ratio() - held_rate_.ratio()) <= kRateUnit) return;
   foreign_.expected_rate = held_rate_;
   foreign_.found_rate = *found;
+  ++foreign_rates_;
   rate_steps_.restart();
   held_rate_ = *found;
   history_.steer(latest_.free_running, *found);

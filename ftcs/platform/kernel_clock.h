@@ -83,6 +83,8 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] ForeignSteering take_foreign_steering() noexcept;
   /// How often somebody else has stepped the clock.
   [[nodiscard]] std::uint64_t foreign_steps() const noexcept { return foreign_steps_; }
+  /// How often somebody else has changed its frequency; as far as was seen.
+  [[nodiscard]] std::uint64_t foreign_rates() const noexcept { return foreign_rates_; }
   /// Set for good once the device is gone.
   [[nodiscard]] std::optional<ClockError> failure() const noexcept { return failure_; }
   [[nodiscard]] ClockDevice& device() noexcept { return device_; }
@@ -151,6 +153,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   int expected_leap_ = 0;
   ForeignSteering foreign_{};
   std::uint64_t foreign_steps_ = 0;
+  std::uint64_t foreign_rates_ = 0;
   std::optional<ClockError> failure_{};
 };
 

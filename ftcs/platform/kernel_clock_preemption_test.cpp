@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_clocks.h"
-#include "ftcs/platform/fake_preemption.h"
 #include "ftcs/platform/kernel_clock.h"
+#include "test/support/fake_clocks.h"
+#include "test/support/fake_preemption.h"
 
 namespace ftcs::platform {
 namespace {

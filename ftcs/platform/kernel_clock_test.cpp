@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_clocks.h"
+#include "test/support/fake_clocks.h"
 
 namespace ftcs::platform {
 namespace {
@@ -251,6 +251,7 @@ TEST_P(KernelClockTest, reports_a_frequency_that_somebody_else_set) {
   EXPECT_NEAR(foreign.found_rate->ppm(), 25.0, 1e-4);
   EXPECT_NEAR(foreign.expected_rate->ppm(), 10.0, 1e-4);
   EXPECT_FALSE(clock.take_foreign_steering().found_rate.has_value()) << "once";
+  EXPECT_EQ(clock.foreign_rates(), 1U);
 }
 
 TEST_P(KernelClockTest, the_end_of_a_correction_does_not_hide_that_somebody_changed_the_frequency) {

@@ -118,18 +118,34 @@ bool stamps_already(Kernel& kernel, int fd, const std::string& name, unsigned wa
          ((1U << static_cast<unsigned>(config.rx_filter)) & wanted_filters) != 0;
 }
 
+/// The narrowest filter that passes PTP event messages comes first; drivers widen it as they need.
+constexpr std::array<hwtstamp_rx_filters, 3> useful_filters(bool ethernet) {
+  return {ethernet ? HWTSTAMP_FILTER_PTP_V2_L2_EVENT : HWTSTAMP_FILTER_PTP_V2_L4_EVENT,
+          HWTSTAMP_FILTER_PTP_V2_EVENT, HWTSTAMP_FILTER_ALL};
+}
+
+constexpr unsigned bits(const std::array<hwtstamp_rx_filters, 3>& filters) {
+  unsigned wanted = 0;
+  for (const auto filter : filters) wanted |= 1U << static_cast<unsigned>(filter);
+  return wanted;
+}
+
 }  // namespace
+
+bool has_hardware_timestamps_on(Kernel& kernel, const std::string& name, bool ethernet) {
+  const int fd = kernel.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return false;
+  const Descriptor socket(kernel, fd);
+  return stamps_already(kernel, fd, name, bits(useful_filters(ethernet)));
+}
 
 std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const std::string& name,
                                                   const InterfaceCapabilities& capabilities,
                                                   bool ethernet) {
-  // The narrowest filter that passes PTP event messages; drivers widen it as they need.
-  const std::array filters{
-      ethernet ? HWTSTAMP_FILTER_PTP_V2_L2_EVENT : HWTSTAMP_FILTER_PTP_V2_L4_EVENT,
-      HWTSTAMP_FILTER_PTP_V2_EVENT, HWTSTAMP_FILTER_ALL};
+  const auto filters = useful_filters(ethernet);
   int result = -ERANGE;
-  unsigned wanted = 0;
-  for (const auto filter : filters) wanted |= 1U << filter;
+  // Whoever switched them on may need a wider filter than we do.
+  if (stamps_already(kernel, fd, name, bits(filters))) return std::nullopt;
   for (const auto filter : filters) {
     if ((capabilities.receive_filters & (1U << filter)) == 0) continue;
     hwtstamp_config config{};
@@ -141,7 +157,6 @@ std::optional<OsError> enable_hardware_timestamps(Kernel& kernel, int fd, const 
     if (result >= 0) return std::nullopt;
     if (result == -EPERM) break;
   }
-  if (result == -EPERM && stamps_already(kernel, fd, name, wanted)) return std::nullopt;
   return os_error(-result, "hardware time stamping on " + name);
 }
 

@@ -50,6 +50,11 @@ struct InterfaceCapabilities {
     Kernel& kernel, int fd, const std::string& name, const InterfaceCapabilities& capabilities,
     bool ethernet);
 
+/// Whether they are on already, by a filter that passes what enable_hardware_timestamps() would ask
+/// for. Only reads.
+[[nodiscard]] bool has_hardware_timestamps_on(Kernel& kernel, const std::string& name,
+                                              bool ethernet);
+
 /// A 48-bit address to make a clock identity of: the interface's own or, where it has none
 /// (loopback), a locally administered one of this process, so that two processes on loopback are
 /// two clocks.

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_kernel.h"
+#include "test/support/fake_kernel.h"
 
 namespace ftcs::platform {
 namespace {
@@ -50,10 +50,28 @@ TEST(NetworkInterface, reports_why_hardware_stamps_cannot_be_enabled) {
       << "somebody who may has switched them on";
   EXPECT_TRUE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, true))
       << "those of UDP are not those of IEEE 802.3";
+  kernel.stamps_are_on = false;
   capabilities.receive_filters = 0;
   const auto none = enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false);
   ASSERT_TRUE(none);
   EXPECT_EQ(none->kind, OsErrorKind::kTimestampingUnsupported);
+}
+
+// Another program's filter may be wider than ours.
+TEST(NetworkInterface, changes_no_stamps_that_are_on_already) {
+  FakeKernel kernel;
+  InterfaceCapabilities capabilities;
+  capabilities.receive_filters = 1U << HWTSTAMP_FILTER_PTP_V2_L4_EVENT;
+  EXPECT_FALSE(has_hardware_timestamps_on(kernel, "eth0", false));
+  kernel.stamps_are_on = true;
+  EXPECT_TRUE(has_hardware_timestamps_on(kernel, "eth0", false));
+  EXPECT_FALSE(has_hardware_timestamps_on(kernel, "eth0", true));
+  EXPECT_EQ(kernel.stamp_changes, 0);
+  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false));
+  EXPECT_EQ(kernel.stamp_changes, 0);
+  kernel.stamps_are_on = false;
+  EXPECT_FALSE(enable_hardware_timestamps(kernel, kSocket, "eth0", capabilities, false));
+  EXPECT_EQ(kernel.stamp_changes, 1);
 }
 
 TEST(NetworkInterface, finds_the_machines_loopback) {

@@ -54,7 +54,7 @@ std::optional<OsError> PtpTransport::send_to(Channel channel, std::span<const st
 }
 
 std::optional<OsError> PtpTransport::note(std::optional<OsError> error) {
-  if (error) suspect_ = true;
+  if (error && error->number != EAGAIN) suspect_ = true;  // a full queue says nothing of the link
   return error;
 }
 
@@ -121,6 +121,13 @@ void PtpTransport::check_link(FreeRunningTime now) {
   if (!state->up) return lose(os_error(ENETDOWN, "interface " + config_.interface).message());
   if (state->index != socket_->interface().index) {
     return lose("interface " + config_.interface + ": was replaced");
+  }
+  if (config_.transport == NetworkTransport::kUdpIpv4) {
+    const int descriptor = socket_->descriptor(Channel::kGeneral);
+    // Syncs would come on, but no answer: it is said, and open() waits for the address.
+    if (const auto none = missing_ipv4_address(kernel_, descriptor, config_.interface)) {
+      return lose(none->message());
+    }
   }
   carrier_is_reported_ = carrier_is_reported_ || state->running;
   const bool carrier = state->running || !carrier_is_reported_;

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_kernel.h"
+#include "test/support/fake_kernel.h"
 
 namespace ftcs::platform {
 namespace {
@@ -139,6 +139,30 @@ TEST(PtpTransport, looks_at_the_link_at_once_when_sending_fails) {
   (void)bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1));
   bench.transport.wait_until(bench.clock->source().now());
   EXPECT_EQ(bench.recorder.events, (Events{"down: interface eth0: no such device"}));
+}
+
+// Syncs came on, requests had no sender to be answered: not a line until the end.
+TEST(PtpTransport, an_address_that_is_taken_away_is_said_and_waited_for) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_has_address = false;
+  bench.run_for(seconds{2});
+  ASSERT_EQ(bench.recorder.events.size(), 1U);
+  EXPECT_EQ(bench.recorder.events[0].find("down: interface eth0"), 0U);
+  bench.kernel.interface_has_address = true;
+  bench.run_for(seconds{10});
+  ASSERT_EQ(bench.recorder.events.size(), 2U);
+  EXPECT_EQ(bench.recorder.events[1], "up");
+}
+
+TEST(PtpTransport, a_full_queue_says_nothing_of_the_link) {
+  Bench bench;
+  ASSERT_FALSE(bench.transport.open());
+  bench.kernel.interface_exists = false;
+  bench.kernel.send_errno = EAGAIN;
+  EXPECT_TRUE(bench.transport.send(Channel::kEvent, std::vector<std::uint8_t>(44, 1)));
+  bench.transport.wait_until(bench.clock->source().now());
+  EXPECT_TRUE(bench.recorder.events.empty()) << "the link is looked at when that is due";
 }
 
 TEST(PtpTransport, a_transient_send_error_closes_nothing) {

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_clocks.h"
 #include "ftcs/platform/kernel_clock.h"
+#include "test/support/fake_clocks.h"
 
 namespace ftcs::platform {
 namespace {

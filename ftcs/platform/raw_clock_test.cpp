@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/platform/fake_kernel.h"
+#include "test/support/fake_kernel.h"
 
 namespace ftcs::platform {
 namespace {

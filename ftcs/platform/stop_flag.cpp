@@ -6,10 +6,12 @@
 namespace ftcs::platform {
 namespace {
 
-// The one global of this layer: a signal handler has no other way to say anything.
+// The globals of this layer: a signal handler has no other way to say anything.
 volatile std::sig_atomic_t stop_requested = 0;
+volatile std::sig_atomic_t hung_up = 0;
 
 void request_stop(int) { stop_requested = 1; }
+void hang_up(int) { hung_up = 1; }
 
 }  // namespace
 
@@ -28,5 +30,21 @@ StopFlag::~StopFlag() {
 }
 
 bool StopFlag::is_set() const noexcept { return stop_requested != 0; }
+
+HangupFlag::HangupFlag() {
+  hung_up = 0;
+  struct sigaction action {};
+  sigemptyset(&action.sa_mask);
+  action.sa_handler = hang_up;
+  sigaction(SIGHUP, &action, &previous_);
+}
+
+HangupFlag::~HangupFlag() { sigaction(SIGHUP, &previous_, nullptr); }
+
+bool HangupFlag::take() noexcept {
+  const bool came = hung_up != 0;
+  hung_up = 0;
+  return came;
+}
 
 }  // namespace ftcs::platform

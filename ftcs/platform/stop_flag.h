@@ -24,4 +24,20 @@ class StopFlag {
   std::array<struct sigaction, kSignals.size()> previous_{};
 };
 
+/// Turns SIGHUP into a wish for as long as it lives, within a StopFlag, which would take it for an
+/// end.
+class HangupFlag {
+ public:
+  HangupFlag();
+  ~HangupFlag();
+  HangupFlag(const HangupFlag&) = delete;
+  HangupFlag& operator=(const HangupFlag&) = delete;
+
+  /// Whether a signal has come since it was asked last.
+  [[nodiscard]] bool take() noexcept;
+
+ private:
+  struct sigaction previous_ {};
+};
+
 }  // namespace ftcs::platform

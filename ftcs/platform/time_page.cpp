@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -33,15 +34,17 @@ Result<TimePage, OsError> TimePage::open(const std::string& path) {
   const int file =
       ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kReadable);
   if (file < 0) return failed(errno);
-  int code = make_page(file);
+  int code = ::flock(file, LOCK_EX | LOCK_NB) == 0 ? make_page(file) : errno;
   void* memory = MAP_FAILED;
   if (code == 0) {
     memory = ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
     if (memory == MAP_FAILED) code = errno;
   }
-  ::close(file);
-  if (code != 0) return failed(code);
-  TimePage page(static_cast<ftcs_time_page*>(memory));
+  if (code != 0) {
+    ::close(file);
+    return failed(code == EWOULDBLOCK ? EBUSY : code);
+  }
+  TimePage page(static_cast<ftcs_time_page*>(memory), file);
   page.page_->sequence = 0;
   page.write({});
   page.page_->version = FTCS_TIME_PAGE_VERSION;
@@ -50,12 +53,14 @@ Result<TimePage, OsError> TimePage::open(const std::string& path) {
   return page;
 }
 
-TimePage::TimePage(TimePage&& other) noexcept : page_(std::exchange(other.page_, nullptr)) {}
+TimePage::TimePage(TimePage&& other) noexcept
+    : page_(std::exchange(other.page_, nullptr)), file_(std::exchange(other.file_, -1)) {}
 
 TimePage::~TimePage() {
   if (page_ == nullptr) return;
   write({});
   ::munmap(page_, kSize);
+  ::close(file_);
 }
 
 void TimePage::write(const Content& content) noexcept {

@@ -24,6 +24,7 @@ class TimePage {
   };
 
   /// Makes the file, or takes the one that is there: a regular one, by no link. Mode 0644.
+  /// EBUSY: somebody else writes it.
   [[nodiscard]] static Result<TimePage, OsError> open(const std::string& path);
 
   TimePage(TimePage&& other) noexcept;
@@ -36,8 +37,9 @@ class TimePage {
   void write(const Content& content) noexcept;
 
  private:
-  explicit TimePage(ftcs_time_page* page) : page_(page) {}
+  TimePage(ftcs_time_page* page, int file) : page_(page), file_(file) {}
   ftcs_time_page* page_ = nullptr;
+  int file_ = -1;  ///< open for its lock alone
 };
 
 }  // namespace ftcs::platform

@@ -54,6 +54,17 @@ TEST_F(TimePageTest, tells_the_time_between_two_instants_and_how_far_it_has_grow
   EXPECT_EQ(ftcs_now(reader_, &now), FTCS_UNKNOWN) << "the writer has ended";
 }
 
+TEST_F(TimePageTest, has_one_writer) {
+  const auto second = TimePage::open(path_);
+  ASSERT_FALSE(second.ok());
+  EXPECT_EQ(second.error().number, EBUSY);
+  page_->write({FTCS_LOCKED, 1'000, 5'000'000'000, 1.0, 100.0, 1e-7});
+  ftcs_time now{};
+  EXPECT_EQ(ftcs_time_at(reader_, 1'000, &now), FTCS_LOCKED) << "the refused one changed nothing";
+  page_.reset();
+  EXPECT_TRUE(TimePage::open(path_).ok()) << "the lock goes with its writer";
+}
+
 // A page on a disk, whose writer ended with the machine: CLOCK_MONOTONIC_RAW begins again.
 TEST_F(TimePageTest, a_page_from_before_a_restart_tells_nothing) {
   ftcs_time now{};

@@ -22,6 +22,7 @@ enum class Counter : std::uint8_t {
   kPdelayReqReceived,
   kPdelayRespReceived,
   kPdelayRespFollowUpReceived,
+  kAuthenticated,  ///< of those, and of those that are dropped below
   // Sent.
   kAnnounceSent,
   kSyncSent,
@@ -43,6 +44,12 @@ enum class Counter : std::uint8_t {
   kWrongLength,
   kBadTimestamp,
   kMalformedTlv,
+  // Not authentic (16.14), where a security association is asked for: the message is dropped.
+  kAuthenticationMissing,      ///< no AUTHENTICATION TLV
+  kAuthenticationUnsupported,  ///< of delayed processing, or not as long as its key says
+  kAuthenticationUnknownKey,   ///< another SPP, or a keyID that the association does not have
+  kAuthenticationWrongCode,    ///< another key under this number, or a changed message
+  kReplayed,  ///< authentic, but of a sequenceId that has passed or is beyond the window
   // Not for us: the message is dropped.
   kWrongSdo,
   kWrongDomain,
@@ -99,6 +106,7 @@ enum class Counter : std::uint8_t {
   kReferenceJumps,  ///< the reference leapt against our oscillator: reported, open exchanges are
                     ///< forgotten
   kUnusableTime,    ///< a time that no Timestamp can carry: the message is not sent
+  kNotSealed,       ///< no authentication code could be computed: the message is not sent
   // Transmitters.
   kTransmitterChanges,
   kAnnounceTimeouts,  ///< the selected transmitter stopped: back to LISTENING, or to the next best

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/monitor_fixture.h"
 #include "test/support/forbid_allocation.h"
+#include "test/support/monitor_fixture.h"
 
 namespace ftcs::ptp {
 namespace {

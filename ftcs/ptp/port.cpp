@@ -13,7 +13,7 @@ std::optional<Message> Port::read(std::span<const std::uint8_t> bytes) noexcept 
     count(counter_of(decoded.error().reason));
     return std::nullopt;
   }
-  if (!is_for_us(decoded->header)) return std::nullopt;
+  if (!is_for_us(decoded->header) || !is_authentic(bytes)) return std::nullopt;
   std::optional<Message> message{*decoded};
   const MessageType type = type_of(message->body);
   if (config_.assume_two_step && (type == MessageType::kSync || type == MessageType::kPdelayResp)) {
@@ -35,6 +35,29 @@ bool Port::is_for_us(const Header& header) noexcept {
   return false;
 }
 
+bool Port::is_authentic(std::span<const std::uint8_t> bytes) noexcept {
+  if (config_.security == nullptr) return true;
+  const Authenticity found = authenticate(*config_.security, bytes);
+  switch (found) {
+    case Authenticity::kAuthentic:
+      count(Counter::kAuthenticated);
+      break;
+    case Authenticity::kMissing:
+      count(Counter::kAuthenticationMissing);
+      break;
+    case Authenticity::kUnsupported:
+      count(Counter::kAuthenticationUnsupported);
+      break;
+    case Authenticity::kUnknownKey:
+      count(Counter::kAuthenticationUnknownKey);
+      break;
+    case Authenticity::kWrongCode:
+      count(Counter::kAuthenticationWrongCode);
+      break;
+  }
+  return found == Authenticity::kAuthentic;
+}
+
 Header Port::header(std::uint16_t sequence_id, std::int8_t log_interval) const noexcept {
   Header header;
   header.major_sdo_id = config_.major_sdo_id;
@@ -49,8 +72,11 @@ Header Port::header(std::uint16_t sequence_id, std::int8_t log_interval) const n
 
 void Port::send(const Message& message, Destination destination, Counter sent,
                 ActionList& actions) noexcept {
-  const auto bytes = encode(message);
+  auto bytes = encode(message);
   if (!bytes) return count(Counter::kUnusableTime);
+  if (config_.security != nullptr && !seal(*config_.security, *bytes)) {
+    return count(Counter::kNotSealed);
+  }
   count(sent);
   if (config_.unicast && destination != Destination::kSender) destination = Destination::kPeer;
   const MessageType type = type_of(message.body);

@@ -7,6 +7,7 @@
 
 #include "ftcs/ptp/actions.h"
 #include "ftcs/ptp/counters.h"
+#include "ftcs/ptp/security_association.h"
 
 namespace ftcs::ptp {
 
@@ -18,6 +19,8 @@ struct PortConfig {
   std::uint8_t minor_version = 1;  ///< of what is sent
   bool unicast = false;            ///< to the one configured peer instead of multicast
   bool assume_two_step = false;    ///< take every Sync and Pdelay_Resp for a two-step one
+  /// Every message is sent with an AUTHENTICATION TLV, and dropped without (16.14); null: none.
+  const SecurityAssociation* security = nullptr;
 };
 
 /// What time receiver, time transmitter and peer delay share: identity, state, counters, and the
@@ -37,6 +40,7 @@ class Port {
   void push(const Action& action, ActionList& actions) noexcept;
   void count(Counter counter, std::uint64_t times = 1) noexcept { counters_.add(counter, times); }
 
+  [[nodiscard]] const SecurityAssociation* security() const noexcept { return config_.security; }
   [[nodiscard]] const PortIdentity& identity() const noexcept { return config_.identity; }
   [[nodiscard]] PortState state() const noexcept { return state_; }
   /// Neither initializing nor faulty.
@@ -48,6 +52,7 @@ class Port {
 
  private:
   [[nodiscard]] bool is_for_us(const Header& header) noexcept;
+  [[nodiscard]] bool is_authentic(std::span<const std::uint8_t> bytes) noexcept;
 
   PortConfig config_;
   PortState state_ = PortState::kInitializing;

@@ -41,6 +41,7 @@ class ReferenceWatch {
 
   constexpr Finding on_sync(const EventPair& pair) noexcept {
     if (goes_on(pair)) return go_on(pair);
+    if (!candidate_) contradicted_ = pair;
     if (!candidate_ || !agree(*candidate_, pair, between(*candidate_, pair))) {
       first_ = pair;
       agreeing_ = 0;
@@ -60,7 +61,7 @@ class ReferenceWatch {
   }
   /// Of a response: nothing is learnt from it.
   [[nodiscard]] constexpr bool goes_on(const EventPair& pair) const noexcept {
-    return !last_ || agree(*last_, pair, between(*last_, candidate_ ? first_ : pair));
+    return !last_ || agree(*last_, pair, between(*last_, candidate_ ? contradicted_ : pair));
   }
   constexpr void reset() noexcept { *this = ReferenceWatch{}; }
 
@@ -91,7 +92,8 @@ class ReferenceWatch {
 
   std::optional<EventPair> last_{};       ///< believed
   std::optional<EventPair> candidate_{};  ///< the newest of those that contradict it
-  EventPair first_{};                     ///< of those
+  EventPair contradicted_{};              ///< the first of them
+  EventPair first_{};                     ///< the first of those that agree with the newest
   int agreeing_ = 0;
   Duration last_gap_{};
   Duration usual_gap_{};  ///< the shorter one of the last two

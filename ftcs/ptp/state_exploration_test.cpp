@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "ftcs/ptp/receiver_fixture.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::ptp::receiver_test {
 namespace {

@@ -2,6 +2,7 @@
 #include "ftcs/ptp/time_receiver.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "ftcs/ptp/interval.h"
 
@@ -13,8 +14,8 @@ bool same_reference(const TransmitterData& a, const TransmitterData& b) noexcept
 }
 
 PortConfig port_config(const TimeReceiverConfig& config) noexcept {
-  return {config.port,          config.domain,  config.major_sdo_id,
-          config.minor_version, config.unicast, config.assume_two_step};
+  return {config.port,    config.domain,          config.major_sdo_id, config.minor_version,
+          config.unicast, config.assume_two_step, config.security};
 }
 
 PeerDelayConfig peer_delay_config(const TimeReceiverConfig& config) noexcept {
@@ -205,6 +206,8 @@ void TimeReceiver::select(const TransmitterData& data, FreeRunningTime now,
   }
   had_transmitter_ = true;
   port_.push(TransmitterSelected{data, changed}, actions);
+  if (untold_jump_)
+    port_.push(ReferenceJumped{*std::exchange(untold_jump_, std::nullopt)}, actions);
   if (same_port) return;
   if (!measured) forget_exchanges();
   if (config_.major_sdo_id == 0) peer_delay_.set_transmitter(data.port);
@@ -234,19 +237,24 @@ void TimeReceiver::send_delay_req_if_due(FreeRunningTime now, ActionList& action
              Counter::kDelayReqSent, actions);
 }
 
-void TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
+/// True if the pair is believed.
+bool TimeReceiver::emit(std::optional<EventPair> pair, FreeRunningTime now,
                         ActionList& actions) noexcept {
-  if (!pair) return;
+  if (!pair) return false;
   // t2 = t1 + (mean + asymmetry) + offset and t4 = t3 + (mean - asymmetry) - offset: added to both,
   // the mean remains.
   pair->reference = pair->reference + config_.delay_asymmetry;
-  if (!believes(*pair, now, actions)) return;
-  if (!has_transmitter_) return fast_start_.keep(*pair);
+  if (!believes(*pair, now, actions)) return false;
+  if (!has_transmitter_) {
+    fast_start_.keep(*pair);
+    return true;
+  }
   if (pair->direction == Direction::kForward && servo_locked_ &&
       port_.state() == PortState::kUncalibrated) {
     port_.change_state(PortState::kTimeReceiver, PortEvent::kTransmitterClockSelected, actions);
   }
   deliver(*pair, actions);
+  return true;
 }
 
 /// Whether the pair tells the time as those before it, or one that was told often enough.
@@ -272,13 +280,19 @@ void TimeReceiver::follow_jump(Duration jump, FreeRunningTime now, ActionList& a
   if (delay_requests_.running()) delay_requests_.restart(now, port_.counters());
   peer_delay_.abandon_exchange();
   fast_start_.forget_pairs();
-  if (has_transmitter_) port_.push(ReferenceJumped{jump}, actions);
+  if (has_transmitter_) {
+    port_.push(ReferenceJumped{jump}, actions);
+  } else if (had_transmitter_) {
+    untold_jump_ = untold_jump_.value_or(Duration{}) + jump;
+  }
 }
 
 // What the reference showed is remembered: another transmitter that tells another time, or the
 // first message after a change, is believed as any jump is.
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
+  sequence_window_.reset();
+  last_announce_.reset();
   delay_requests_.stop(port_.counters());
   has_information_ = false;
   new_time_base_told_ = 0;

@@ -13,6 +13,7 @@
 #include "ftcs/ptp/peer_delay.h"
 #include "ftcs/ptp/port.h"
 #include "ftcs/ptp/reference_watch.h"
+#include "ftcs/ptp/sequence_window.h"
 #include "ftcs/ptp/sync_matcher.h"
 
 namespace ftcs::ptp {
@@ -37,6 +38,9 @@ struct TimeReceiverConfig {
   /// (802.1AS-2020, 10.7.3.1). 0: never.
   std::uint8_t sync_receipt_timeout = 0;
   AcceptableTransmitters acceptable{};  ///< empty: all
+  /// See PortConfig. Syncs, Follow_Ups and Announces of the selected transmitter must also be new:
+  /// see SequenceWindow.
+  const SecurityAssociation* security = nullptr;
   /// While no transmitter is selected: its first Announce selects it (9.3.2.5 wants two), and the
   /// Syncs that come before are measured already.
   bool fast_start = false;
@@ -138,7 +142,9 @@ class TimeReceiver {
   void lose_transmitter(Counter reason, FreeRunningTime now, ActionList& actions) noexcept;
   [[nodiscard]] std::optional<FreeRunningTime> sync_timeout() const noexcept;
   void send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept;
-  void emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
+  bool emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
+  [[nodiscard]] bool is_new(const Header& header, FreeRunningTime now) noexcept;
+  [[nodiscard]] bool is_new_announce(const Header& header) noexcept;
   [[nodiscard]] bool believes(const EventPair& pair, FreeRunningTime now,
                               ActionList& actions) noexcept;
   void follow_jump(Duration jump, FreeRunningTime now, ActionList& actions) noexcept;
@@ -157,9 +163,12 @@ class TimeReceiver {
   TransmitterData transmitter_{};
   std::optional<Duration> sync_interval_;
   SyncMatcher matcher_;
+  SequenceWindow sequence_window_;                ///< of Sync and Follow_Up
+  std::optional<std::uint16_t> last_announce_{};  ///< sequence id of transmitter_'s
   DelayRequests delay_requests_;
   ReferenceWatch reference_;
-  FreeRunningTime last_sync_{};  ///< of the followed transmitter, or when it was selected
+  std::optional<Duration> untold_jump_{};  ///< found while none was selected
+  FreeRunningTime last_sync_{};            ///< of the followed transmitter, or when it was selected
   bool has_information_ = false;
   FollowUpInformation information_{};
   std::uint16_t new_time_base_ = 0;  ///< another indicator than the believed one, told so often

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "ftcs/ptp/interval.h"
+#include "ftcs/ptp/sequence.h"
 #include "ftcs/ptp/time_receiver.h"
 
 namespace ftcs::ptp {
@@ -126,6 +127,31 @@ Duration TimeReceiver::believed_interval(const Header& header, FreeRunningTime n
   return last ? std::min(believed, std::max(own, multiply(now - *last, 2))) : believed;
 }
 
+/// Of an authentic Sync or Follow_Up: that it is not a copy of an old one (16.14.4.3).
+bool TimeReceiver::is_new(const Header& header, FreeRunningTime now) noexcept {
+  const SecurityAssociation* const security = port_.security();
+  if (security == nullptr || security->sequence_window == 0) return true;
+  const bool found = sequence_window_.is_new(header.sequence_id, security->sequence_window,
+                                             sync_interval_.value_or(Duration{}), now);
+  if (!found) port_.count(Counter::kReplayed);
+  return found;
+}
+
+/// Of an authentic Announce: old ones must not keep a transmitter alive that is silent. One that
+/// was started again is lost with its Announce receipt timeout, and heard anew.
+bool TimeReceiver::is_new_announce(const Header& header) noexcept {
+  const SecurityAssociation* const security = port_.security();
+  const bool judged = security != nullptr && security->sequence_window > 0 && has_transmitter_ &&
+                      header.source == transmitter_.port;
+  if (!judged) return true;
+  if (last_announce_ && sequence_distance(header.sequence_id, *last_announce_) <= 0) {
+    port_.count(Counter::kReplayed);
+    return false;
+  }
+  last_announce_ = header.sequence_id;
+  return true;
+}
+
 void TimeReceiver::on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
                                ActionList& actions) noexcept {
   if (announce.steps_removed >= kMaximumStepsRemoved || header.source.clock == config_.port.clock ||
@@ -134,6 +160,7 @@ void TimeReceiver::on_announce(const Header& header, const Announce& announce, F
     port_.count(Counter::kUnusableAnnounce);
     return;
   }
+  if (!is_new_announce(header)) return;
   port_.count(Counter::kAnnounceReceived);
   const Duration interval = believed_interval(header, now);
   TransmitterData data{header.source, announce, header.flags};
@@ -152,13 +179,13 @@ void TimeReceiver::on_announce(const Header& header, const Announce& announce, F
 
 void TimeReceiver::on_sync(const Header& header, const Sync& sync, const Input& input,
                            ActionList& actions) noexcept {
-  if (!usable_correction(header)) return;
+  if (!usable_correction(header) || !is_new(header, input.now)) return;
   port_.count(Counter::kSyncReceived);
   last_sync_ = input.now;
   if (const auto interval = interval_from_log(header.log_interval)) sync_interval_ = interval;
   if (config_.hybrid) port_.push(SenderIsTransmitter{}, actions);
-  emit(matcher_.on_sync(header, sync, *input.received, input.now, port_.counters()), input.now,
-       actions);
+  const auto pair = matcher_.on_sync(header, sync, *input.received, input.now, port_.counters());
+  if (emit(pair, input.now, actions)) sequence_window_.use(header.sequence_id, input.now);
   if (peer_to_peer()) return;
   if (!delay_requests_.running()) delay_requests_.start(input.now);
   send_delay_req_if_due(input.now, actions);
@@ -166,12 +193,12 @@ void TimeReceiver::on_sync(const Header& header, const Sync& sync, const Input& 
 
 void TimeReceiver::on_follow_up(const Header& header, const FollowUp& follow_up,
                                 FreeRunningTime now, ActionList& actions) noexcept {
-  if (!usable_correction(header)) return;
+  if (!usable_correction(header) || !is_new(header, now)) return;
   port_.count(Counter::kFollowUpReceived);
   const auto pair = matcher_.on_follow_up(header, follow_up, now, port_.counters());
   const bool informed = pair && config_.major_sdo_id == kGptpSdoId;
   if (informed && !believes_information(follow_up, now, actions)) return;
-  emit(pair, now, actions);
+  if (emit(pair, now, actions)) sequence_window_.use(header.sequence_id, now);
 }
 
 /// 802.1AS-2020, 11.4.4.3: how fast the grandmaster is, by the sender's clock, by which the peer

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/receiver_fixture.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::ptp::receiver_test {
 namespace {
@@ -476,6 +476,27 @@ TEST_F(Receiver, syncs_that_contradict_the_others_one_by_one_or_in_a_burst_are_n
   EXPECT_EQ(emitted, 200U);
   EXPECT_EQ(count(Counter::kReferenceJumps), 0U);
   EXPECT_EQ(count(Counter::kDoubtedTime), 100U + 40U);
+}
+
+// Each change of the sign began the contradiction anew, and after seconds of it the oscillator's
+// doubt was as wide as the forgery.
+TEST_F(Receiver, syncs_that_contradict_each_other_too_do_not_wear_the_oscillator_out) {
+  select_a();
+  std::uint16_t id = 0;
+  std::size_t emitted = 0;
+  const auto hear = [&](Nanoseconds at, Nanoseconds told) {
+    const auto actions = event(message_from(kA, id++, Sync{reference(told)}), at);
+    emitted += of<EmitPair>(actions).size();
+  };
+  for (int i = 0; i < 8; ++i) hear(1s + i * 125ms, 1s + i * 125ms);
+  for (int i = 0; i < 600; ++i) {
+    const Nanoseconds at = 2s + i * 100ms;
+    hear(at, at + (i % 2 == 0 ? 999ms : -999ms));
+    if (i % 20 == 0) static_cast<void>(general(announce_from(kA), at));
+  }
+  EXPECT_EQ(emitted, 8U);
+  hear(63s, 63s);
+  EXPECT_EQ(emitted, 9U);
 }
 
 // Syncs that tell the true time make the gap between two short; three an hour ahead within a few

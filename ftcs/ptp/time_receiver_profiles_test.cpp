@@ -2,7 +2,7 @@
 //
 // The world of receiver_fixture.h, with receivers that are not of the default profile: peer to
 // peer, IEEE 802.1AS, hybrid, with a table of acceptable transmitters, with a fast start.
-#include "ftcs/ptp/receiver_fixture.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::ptp::receiver_test {
 namespace {

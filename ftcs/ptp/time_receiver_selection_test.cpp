@@ -3,7 +3,7 @@
 // The world: receiver_fixture.h. Transmitters that come, go, improve and change.
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/receiver_fixture.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::ptp::receiver_test {
 namespace {

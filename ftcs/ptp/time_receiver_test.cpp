@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ptp/receiver_fixture.h"
 #include "test/support/forbid_allocation.h"
+#include "test/support/receiver_fixture.h"
 
 namespace ftcs::ptp::receiver_test {
 namespace {

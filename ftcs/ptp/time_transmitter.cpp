@@ -24,8 +24,8 @@ FreeRunningTime after(FreeRunningTime due, Duration interval, FreeRunningTime no
 }
 
 PortConfig port_config(const TimeTransmitterConfig& config) noexcept {
-  return {config.port,          config.domain,  config.major_sdo_id,
-          config.minor_version, config.unicast, config.assume_two_step};
+  return {config.port,    config.domain,          config.major_sdo_id, config.minor_version,
+          config.unicast, config.assume_two_step, config.security};
 }
 
 /// Our event clock is the reference; the peer delay mechanism only asks that it is one clock.
@@ -162,10 +162,12 @@ void TimeTransmitter::dispatch(const Message& message, std::optional<ReferenceTi
       return port_.count(Counter::kSignalingIgnored);
     case MessageType::kManagement:
       return port_.count(Counter::kManagementIgnored);
+    case MessageType::kAnnounce:
+      port_.push(TransmitterSeen{header.source}, actions);
+      return port_.count(Counter::kNotForThisRole);
     case MessageType::kSync:
     case MessageType::kFollowUp:
     case MessageType::kDelayResp:
-    case MessageType::kAnnounce:
       return port_.count(Counter::kNotForThisRole);
   }
 }

@@ -33,6 +33,7 @@ struct TimeTransmitterConfig {
   bool assume_two_step = false;  ///< of Pdelay_Resp, see PortConfig
   bool follow_up_info = false;   ///< send the Follow_Up information TLV (802.1AS-2020, 11.4.4.3)
   bool path_trace = false;       ///< send a PATH_TRACE TLV in Announce (16.2)
+  const SecurityAssociation* security = nullptr;  ///< see PortConfig
 };
 
 /// A grandmaster for the lab: it transmits whatever others announce. Two-step Sync, Announce,

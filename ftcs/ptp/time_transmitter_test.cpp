@@ -75,6 +75,14 @@ class Transmitter : public testing::Test {
   TimeTransmitter transmitter_;
 };
 
+TEST_F(Transmitter, tells_of_another_that_announces_itself) {
+  const MessageBytes other =
+      *encode(Message{Header{.domain = 3, .source = {{{9}}, 1}}, Announce{}});
+  const ActionList actions = transmitter_.on_general_message(other.view(), FreeRunningTime{});
+  ASSERT_EQ(actions.size(), 1U);
+  EXPECT_EQ(std::get<TransmitterSeen>(actions[0]).port, (PortIdentity{{{9}}, 1}));
+}
+
 TEST_F(Transmitter, becomes_the_transmitter_at_once) {
   TimeTransmitter transmitter(default_config());
   EXPECT_EQ(transmitter.state(), PortState::kInitializing);
@@ -245,7 +253,7 @@ TEST_F(Transmitter, leaves_alone_what_is_not_for_it) {
   };
   EXPECT_TRUE(receive(kReceiver, 0, DelayReq{}).empty());
   EXPECT_TRUE(receive(kUs, 3, Sync{}).empty());
-  EXPECT_TRUE(receive(kReceiver, 3, Announce{}).empty());
+  EXPECT_TRUE(sent(receive(kReceiver, 3, Announce{})).empty());
   EXPECT_TRUE(receive(kReceiver, 3, PdelayReq{}).empty());
   EXPECT_TRUE(receive(kReceiver, 3, Management{}).empty());
   EXPECT_TRUE(receive(kReceiver, 3, Signaling{}).empty());

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ftcs/ptp/security_association.h"
 #include "ftcs/ptp/time_receiver.h"
 #include "ftcs/ptp/time_transmitter.h"
 #include "test/support/shell_lines.h"
@@ -134,6 +135,30 @@ TEST_F(Tshark, reads_the_stamp_and_the_half_nanosecond_of_a_follow_up) {
              "-e ptp.v2.clockidentity -e ptp.v2.sourceportid -e ptp.v2.logmessageperiod");
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines[0], "1800000000|5|0|0.5|0x020000fffe00000a|1|-3");
+}
+
+TEST_F(Tshark, reads_the_authentication_behind_an_announce) {
+  class Code final : public MessageAuthenticationCode {
+    bool compute(std::span<const std::span<const std::uint8_t>>,
+                 std::span<std::uint8_t> code) noexcept override {
+      std::fill(code.begin(), code.end(), std::uint8_t{0xC0});
+      return true;
+    }
+  };
+  Code code;
+  SecurityAssociation association;
+  association.spp = 5;
+  association.active_key_id = 0x01020304;
+  association.add({0x01020304, 16, &code});
+  std::vector<MessageBytes> messages = conversation(false, 1);
+  for (MessageBytes& message : messages) ASSERT_TRUE(seal(association, message));
+  const auto lines = tshark(messages,
+                            "-e ptp.v2.messagelength -e ptp.v2.an.tlvType -e ptp.v2.an.tlv.data "
+                            "-e _ws.malformed");
+  // Of the others tshark shows the length alone.
+  EXPECT_EQ(lines,
+            (std::vector<std::string>{"90|32777|050001020304c0c0c0c0c0c0c0c0c0c0c0c0c0c0c0c0|",
+                                      "70|||", "70|||", "70|||", "80|||"}));
 }
 
 TEST_F(Tshark, would_find_a_malformed_message) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/record/fields.h"
 
-#include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -18,6 +16,14 @@ std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(kSpaces);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(kSpaces) - first + 1);
+}
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& letter : lower) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return lower;
 }
 
 char separator_of(std::string_view line) {
@@ -54,9 +60,7 @@ std::optional<double> parse_decimal(std::string_view text) {
 }
 
 bool is_missing(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
+  const std::string lower = lower_case(text);
   return lower.empty() || lower == "-" || lower == "nan" || lower == "na" || lower == "null";
 }
 

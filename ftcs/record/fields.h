@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -9,6 +10,9 @@ namespace ftcs {
 
 /// Without spaces and tabs at both ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
+
+/// ASCII letters in lower case, independent of the locale; other octets as they are.
+[[nodiscard]] std::string lower_case(std::string_view text);
 
 /// What separates the fields of a line: a comma if there is one, else a semicolon, else runs of
 /// spaces and tabs (' ').

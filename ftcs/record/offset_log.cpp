@@ -3,13 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "ftcs/record/fields.h"
 
 namespace ftcs {
 namespace {
 
-constexpr std::array<std::string_view, 3> kPrograms = {"ptp4l", "phc2sys", "ts2phc"};
+constexpr std::array<std::string_view, 4> kPrograms = {"ptp4l", "phc2sys", "ts2phc", "ftcs"};
 
 /// The number in the first pair of brackets that holds one: "ptp4l[12.345]", "ptp4l: [12.345]"; in
 /// "ptp4l[991]: [12.345.678]" as syslog writes it, the pair that holds a point.
@@ -39,8 +40,9 @@ std::string_view program_of(std::string_view line) {
   return "ptp4l";  // the form is ptp4l's where nobody signs
 }
 
-/// The words between the time in brackets and "offset", less those that every line has: a clock's
-/// name ("CLOCK_REALTIME phc offset", "eth0 master offset") or a message tag ("[eth1] master").
+/// The words between the time in brackets and "offset" or "rms", less those that every line has: a
+/// clock's name ("CLOCK_REALTIME phc offset", "eth0 master offset") or a message tag ("[eth1]
+/// master").
 std::string clock_of(const std::vector<std::string_view>& words, std::size_t offset_at) {
   std::string clock;
   for (std::size_t i = offset_at; i-- > 0;) {
@@ -77,27 +79,47 @@ std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line) {
   return std::nullopt;
 }
 
+std::optional<SummaryLogLine> parse_summary_log_line(std::string_view line) {
+  const auto words = split_fields(line, ' ');
+  for (std::size_t i = 0; i + 5 < words.size(); ++i) {
+    if (words[i] != "rms" || words[i + 2] != "max" || words[i + 4] != "freq") continue;
+    const auto rms = parse_decimal(words[i + 1]);
+    const auto largest = parse_decimal(words[i + 3]);
+    const auto frequency = parse_decimal(words[i + 5]);
+    if (!rms || !largest || !frequency) continue;
+    return SummaryLogLine{std::string(program_of(line)) + clock_of(words, i), bracketed_time(line),
+                          *rms, *largest, *frequency};
+  }
+  return std::nullopt;
+}
+
 std::string OffsetLog::add(std::string_view line) {
-  auto parsed = parse_offset_log_line(line);
-  if (!parsed) {
-    return is_summary_line(line) ? "a summary (rms, max): the single offsets are not in it"
-                                 : "no offset in it";
+  if (auto parsed = parse_offset_log_line(line)) {
+    source(parsed->source).lines.push_back(std::move(*parsed));
+    return "";
   }
-  auto source = std::find_if(sources_.begin(), sources_.end(),
-                             [&](const Source& known) { return known.name == parsed->source; });
-  if (source == sources_.end()) {
-    sources_.push_back({parsed->source, {}});
-    source = std::prev(sources_.end());
+  if (auto parsed = parse_summary_log_line(line)) {
+    source(parsed->source).summaries.push_back(std::move(*parsed));
+    return "";
   }
-  source->lines.push_back(std::move(*parsed));
-  return "";
+  return "no offset in it";
+}
+
+OffsetLog::Source& OffsetLog::source(const std::string& name) {
+  const auto known = std::find_if(sources_.begin(), sources_.end(),
+                                  [&](const Source& one) { return one.name == name; });
+  if (known != sources_.end()) return *known;
+  return sources_.emplace_back(Source{name, {}, {}});
 }
 
 const OffsetLog::Source* OffsetLog::pick(std::string_view name) const noexcept {
   const Source* best = nullptr;
   for (const Source& source : sources_) {
     if (!name.empty() && source.name != name) continue;
-    if (best == nullptr || source.lines.size() > best->lines.size()) best = &source;
+    const auto rank = [](const Source& one) {
+      return std::pair{one.lines.size(), one.summaries.size()};
+    };
+    if (best == nullptr || rank(source) > rank(*best)) best = &source;
   }
   return best;
 }
@@ -105,21 +127,11 @@ const OffsetLog::Source* OffsetLog::pick(std::string_view name) const noexcept {
 std::string OffsetLog::describe_sources() const {
   std::string text;
   for (const Source& source : sources_) {
-    text += (text.empty() ? "" : ", ") + source.name + " (" + std::to_string(source.lines.size()) +
-            " lines)";
+    text += (text.empty() ? "" : ", ") + source.name + " (" +
+            std::to_string(source.lines.size() + source.summaries.size()) +
+            (source.lines.empty() ? " summaries)" : " lines)");
   }
   return text;
-}
-
-bool is_summary_line(std::string_view line) {
-  const auto words = split_fields(line, ' ');
-  for (std::size_t i = 0; i + 3 < words.size(); ++i) {
-    if (words[i] == "rms" && words[i + 2] == "max" && parse_decimal(words[i + 1]) &&
-        parse_decimal(words[i + 3])) {
-      return true;
-    }
-  }
-  return false;
 }
 
 bool is_linuxptp_line(std::string_view line) {

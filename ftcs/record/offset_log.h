@@ -9,7 +9,7 @@
 
 namespace ftcs {
 
-/// One line of ptp4l, phc2sys or ts2phc that reports an offset (linuxptp 2 to 4):
+/// One line of ptp4l, phc2sys, ts2phc (linuxptp 2 to 4) or ftcs that reports an offset:
 ///
 ///   ptp4l[5197.201]: master offset        -12 s2 freq   +1234 path delay       567
 ///   phc2sys[5197.9]: CLOCK_REALTIME phc offset  31 s2 freq  +5 delay   468
@@ -27,6 +27,22 @@ struct OffsetLogLine {
 /// Nothing if the line does not report an offset.
 [[nodiscard]] std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line);
 
+/// One line that tells of all offsets since the line before, as ptp4l and phc2sys write with a
+/// summary interval:
+///
+///   ptp4l[5197.201]: rms   12 max   30 freq  +1234 +/-   3 delay   567 +/-   1
+///   phc2sys[5197.9]: CLOCK_REALTIME rms   12 max   30 freq  +1234 +/-   3 delay   567 +/-   1
+struct SummaryLogLine {
+  std::string source;
+  std::optional<double> time_s;  ///< as above: of the end of what is summarized
+  double rms_ns = 0.0;           ///< of the offsets
+  double max_ns = 0.0;           ///< the largest |offset|
+  double frequency_ppb = 0.0;    ///< mean of the applied ones
+};
+
+/// Nothing if the line is no summary.
+[[nodiscard]] std::optional<SummaryLogLine> parse_summary_log_line(std::string_view line);
+
 /// The lines of a log, told apart by the program that wrote them and the clock they are about. A
 /// journal holds those of several: their offsets are of different clocks and never one series.
 class OffsetLog {
@@ -34,25 +50,24 @@ class OffsetLog {
   struct Source {
     std::string name;
     std::vector<OffsetLogLine> lines;
+    std::vector<SummaryLogLine> summaries;
   };
 
   /// Why the line is not used, or empty.
   [[nodiscard]] std::string add(std::string_view line);
   /// In the order in which they first appear.
   [[nodiscard]] const std::vector<Source>& sources() const noexcept { return sources_; }
-  /// The source of that name; without a name the one with the most lines (the first of equals).
-  /// Null: there is none.
+  /// The source of that name; without a name the one with the most offsets, or where there are none
+  /// the most summaries (the first of equals). Null: there is none.
   [[nodiscard]] const Source* pick(std::string_view name) const noexcept;
-  /// "ptp4l (62 lines), phc2sys CLOCK_REALTIME (61 lines)".
+  /// "ptp4l (62 lines), phc2sys CLOCK_REALTIME (61 summaries)".
   [[nodiscard]] std::string describe_sources() const;
 
  private:
+  [[nodiscard]] Source& source(const std::string& name);
+
   std::vector<Source> sources_;
 };
-
-/// Is it a summary of several offsets, "rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1" (ptp4l and
-/// phc2sys with a summary interval)? The single offsets are not in it.
-[[nodiscard]] bool is_summary_line(std::string_view line);
 
 /// Does the line come from one of these programs?
 [[nodiscard]] bool is_linuxptp_line(std::string_view line);

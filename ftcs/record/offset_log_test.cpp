@@ -49,10 +49,30 @@ TEST(OffsetLog, tells_programs_and_clocks_of_one_journal_apart) {
   EXPECT_EQ(log.pick("chronyd"), nullptr);
 }
 
-TEST(OffsetLog, says_that_a_summary_holds_no_single_offsets) {
+TEST(OffsetLog, reads_summaries_of_ptp4l_and_phc2sys) {
+  const auto line = parse_summary_log_line(
+      "ptp4l[2.5]: [second] rms   12 max   30 freq  +5123 +/-   3 delay   100 +/-   1");
+  ASSERT_TRUE(line.has_value());
+  EXPECT_EQ(line->source, "ptp4l [second]");
+  EXPECT_EQ(line->time_s, 2.5);
+  EXPECT_EQ(line->rms_ns, 12.0);
+  EXPECT_EQ(line->max_ns, 30.0);
+  EXPECT_EQ(line->frequency_ppb, 5123.0);
+  for (const char* text : {"", "rms 12 max 30", "ptp4l[1.0]: rms x max 30 freq +5 +/- 3",
+                           "ptp4l[1.0]: master offset 1 s2 freq +1 path delay 5"}) {
+    EXPECT_FALSE(parse_summary_log_line(text).has_value()) << text;
+  }
+}
+
+TEST(OffsetLog, prefers_offsets_to_summaries) {
   OffsetLog log;
-  const std::string complaint = log.add("ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1");
-  EXPECT_NE(complaint.find("summary"), std::string::npos);
+  for (const char* text : {"phc2sys[1.0]: CLOCK_REALTIME rms 1 max 3 freq +5 +/- 3 delay 4 +/- 1",
+                           "phc2sys[2.0]: CLOCK_REALTIME rms 1 max 3 freq +5 +/- 3 delay 4 +/- 1",
+                           "ftcs[1.0]: master offset 1 s2 freq +1 path delay 5"}) {
+    EXPECT_EQ(log.add(text), "") << text;
+  }
+  EXPECT_EQ(log.describe_sources(), "phc2sys CLOCK_REALTIME (2 summaries), ftcs (1 lines)");
+  EXPECT_EQ(log.pick("")->name, "ftcs");
   EXPECT_EQ(log.add("ptp4l[2.0]: port 1: MASTER to UNCALIBRATED"), "no offset in it");
 }
 

@@ -9,7 +9,8 @@
 #include <limits>
 
 #include "ftcs/record/fields.h"
-#include "ftcs/record/offset_log.h"
+#include "ftcs/record/log_formats.h"
+#include "ftcs/record/log_series.h"
 #include "ftcs/record/time_grid.h"
 #include "ftcs/record/units.h"
 #include "ftcs/record/value_scale.h"
@@ -20,12 +21,6 @@ namespace {
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 /// Steady, seconds-long steps are the custom of phase files without times.
 constexpr double kDefaultInterval = 1.0;
-
-/// Values and times as they stand in the file.
-struct RawSeries {
-  std::vector<double> values;
-  std::vector<double> times;  // empty = the file has none
-};
 
 /// Where a table keeps what; columns from 0.
 struct TableLayout {
@@ -38,19 +33,13 @@ struct TableLayout {
   double time_scale = 1.0;
 };
 
-std::string lower(std::string_view text) {
-  std::string copy(text);
-  std::transform(copy.begin(), copy.end(), copy.begin(),
-                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
-  return copy;
-}
-
 bool is_comment(std::string_view line) {
-  return line.empty() || line.front() == '#' || line.front() == '%' || line.front() == ';';
+  return line.empty() || line.front() == '#' || line.front() == '%' || line.front() == ';' ||
+         line.starts_with("===");  // chrony rules its headings off
 }
 
 bool is_heading_of_time(std::string_view heading) {
-  const std::string word = lower(heading);
+  const std::string word = lower_case(heading);
   if (word == "t") return true;
   constexpr std::array<std::string_view, 5> kNames = {"time", "timestamp", "date", "epoch", "mjd"};
   return std::any_of(kNames.begin(), kNames.end(), [&word](std::string_view known) {
@@ -206,67 +195,43 @@ class TableReader {
   double origin_ = 0.0;
 };
 
-/// The offsets of one source of a linuxptp log, from its first locked state on.
-class LogReader {
- public:
-  LogReader(const SeriesOptions& options, Series& series) : options_(options), series_(series) {}
+/// What is set for tables alone, by its flag; empty: nothing.
+std::string without_effect(const SeriesOptions& options) {
+  if (!options.column.empty()) return "--column";
+  if (!options.time_column.empty()) return "--time-column";
+  if (!options.time_unit.empty()) return "--time-unit";
+  if (!options.unit.empty()) return "--unit";
+  if (options.nominal_hz) return "--nominal";
+  return options.kind == RecordKind::kFrequency ? "--kind frequency" : "";
+}
 
-  void add(std::string_view line) {
-    if (!log_.add(line).empty()) ++series_.lines_left_out;
+/// The offsets of the clock that a log is about; empty if no line has any. Or what is wrong with
+/// the whole.
+Result<RawSeries, std::string> read_log(LogReader& reader, const SeriesOptions& options,
+                                        Series& series) {
+  series.kind = options.kind.value_or(RecordKind::kOffset);
+  if (reader.empty()) return RawSeries{};
+  const auto log = reader.finish(options.source);
+  if (!log) return log.error();
+  if (const std::string flag = without_effect(options); !flag.empty()) {
+    return flag + " is for tables: a log of " + log->format +
+           " has columns and units of its own, and gives offsets";
   }
-
-  std::optional<ReadError> finish(const LineReader& reader) {
-    series_.kind = RecordKind::kOffset;
-    if (log_.sources().empty()) return std::nullopt;  // said by the check for any number at all
-    const OffsetLog::Source* source = log_.pick(options_.source);
-    if (source == nullptr) {
-      ReadError error = reader.error_here("no offsets of " + quoted_excerpt(options_.source) +
-                                          ": the log has " + log_.describe_sources());
-      error.line = 0;
-      return error;
-    }
-    series_.notes.push_back("a log of linuxptp: offsets in ns, local minus reference");
-    if (log_.sources().size() > 1) {
-      series_.notes.push_back("the log has " + log_.describe_sources() + ": " + source->name +
-                              " is taken; --source chooses");
-    }
-    take(*source);
-    return std::nullopt;
+  if (!log->summaries.empty()) {
+    return log->source +
+           " wrote summaries alone (rms, max), which hold no single offsets: its summary interval "
+           "must be that of Sync";
   }
-
-  RawSeries raw;
-
- private:
-  void take(const OffsetLog::Source& source) {
-    constexpr int kLocked = 2;
-    const auto first = std::find_if(source.lines.begin(), source.lines.end(),
-                                    [](const OffsetLogLine& l) { return l.state >= kLocked; });
-    const bool locked = first != source.lines.end();
-    const auto from = locked ? first : source.lines.begin();
-    // A restarted program begins a new clock: times that go back end their use.
-    bool all_timed = true;
-    for (auto line = from; line != source.lines.end(); ++line) {
-      raw.values.push_back(line->offset_ns * 1e-9);
-      all_timed =
-          all_timed && line->time_s && (raw.times.empty() || *line->time_s >= raw.times.back());
-      if (all_timed) raw.times.push_back(*line->time_s);
-    }
-    if (!all_timed) raw.times.clear();
-    if (from != source.lines.begin()) {
-      series_.notes.push_back(std::to_string(from - source.lines.begin()) +
-                              " offsets before the servo locked (s2) are left out");
-    }
-    if (!locked) series_.notes.emplace_back("the servo never locked (s2): all offsets are taken");
-    if (!all_timed) {
-      series_.notes.emplace_back(
-          "not every line has an ascending time: equal intervals are assumed");
-    }
+  series.lines_left_out = log->unusable;
+  series.notes.push_back("a log of " + log->format +
+                         ": offsets of the recorded clock, local minus reference");
+  series.notes.insert(series.notes.end(), log->notes.begin(), log->notes.end());
+  if (log->locked_from > 0) {
+    series.notes.push_back(std::to_string(log->locked_from) +
+                           " offsets before the servo locked (s2) are left out");
   }
-
-  const SeriesOptions& options_;
-  Series& series_;
-  OffsetLog log_;
-};
+  return offsets_of(*log);
+}
 
 /// From raw values to the grid, and the last checks.
 std::optional<ReadError> finish(RawSeries raw, const SeriesOptions& options,
@@ -329,30 +294,31 @@ Result<Series, ReadError> read_series(const std::string& path, const SeriesOptio
   LineReader& reader = *opened;
   Series series;
   TableReader table(reader, options, series);
-  LogReader log(options, series);
+  LogReader log;
   enum class Format { kUnknown, kTable, kLog } format = Format::kUnknown;
   while (const auto line = reader.next()) {
     const std::string_view text = trimmed(*line);
     if (is_comment(text)) continue;
     std::optional<ReadError> error;
     if (format == Format::kUnknown) {
-      const bool from_log = is_linuxptp_line(text) || parse_offset_log_line(text);
+      // A column that is asked for by name is one of a table, also of a table of stamps.
+      const bool from_log = begins_log(text) && options.column.empty();
       format = from_log ? Format::kLog : Format::kTable;
       if (!from_log) error = table.begin(text);
     } else if (format == Format::kTable) {
       error = table.add(text);
     }
-    if (format == Format::kLog) log.add(text);
+    if (format == Format::kLog) log.add(text, reader.line_number());
     if (error) return *error;
   }
   if (reader.error()) return *reader.error();
+  RawSeries raw = std::move(table.raw);
   if (format == Format::kLog) {
-    if (auto error = log.finish(reader)) return *error;
+    auto read = read_log(log, options, series);
+    if (!read) return ReadError{path, 0, read.error()};
+    raw = std::move(*read);
   }
-  if (auto error = finish(std::move(format == Format::kLog ? log.raw : table.raw), options, reader,
-                          series)) {
-    return *error;
-  }
+  if (auto error = finish(std::move(raw), options, reader, series)) return *error;
   return series;
 }
 

@@ -145,6 +145,60 @@ TEST_F(SeriesReader, reads_a_log_from_its_lock_on) {
   EXPECT_DOUBLE_EQ(series->values[0], -50e-9);
 }
 
+TEST_F(SeriesReader, takes_the_interval_that_is_told_where_a_log_has_no_times) {
+  SeriesOptions options;
+  options.interval_s = 0.125;
+  const auto series = read(
+      "ptp4l: master offset -50 s2 freq +50 path delay 100\n"
+      "ptp4l: master offset 20 s2 freq +60 path delay 100\n"
+      "ptp4l: master offset 10 s2 freq +60 path delay 100\n",
+      options);
+  ASSERT_TRUE(series.ok()) << series.error().text();
+  EXPECT_EQ(series->interval_s, 0.125);
+  ASSERT_EQ(series->values.size(), 3U);
+  EXPECT_NEAR(series->values[1], 20e-9, 1e-15);
+}
+
+TEST_F(SeriesReader, reads_the_offsets_of_chronys_tracking_log) {
+  const auto series = read(
+      "====================\n"
+      "   Date (UTC) Time     IP Address   St   Freq ppm   Skew ppm     Offset L Co  Offset sd\n"
+      "====================\n"
+      "2024-01-01 00:00:00 192.0.2.1 2 20.0 0.1  5.0e-04 N 1 3e-08 0.0 2e-05 2e-05 1.5\n"
+      "2024-01-01 00:00:04 192.0.2.1 2 20.0 0.1 -6.0e-08 N 1 3e-08 0.0 2e-05 2e-05 1.5\n"
+      "2024-01-01 00:00:12 192.0.2.1 2 20.0 0.1  2.0e-08 N 1 3e-08 0.0 2e-05 2e-05 1.5\n"
+      "2024-01-01 00:00:16 192.0.2.1 2 20.0 0.1  3.0e-08 N 1 3e-08 0.0 2e-05 2e-05 1.5\n");
+  ASSERT_TRUE(series.ok()) << series.error().text();
+  EXPECT_EQ(series->kind, RecordKind::kOffset);
+  EXPECT_EQ(series->interval_s, 4.0);
+  EXPECT_EQ(series->missing, 1U);
+  EXPECT_NEAR(series->values[0], 5e-4, 1e-12);
+  EXPECT_NEAR(series->values[1], -6e-8, 1e-12);
+}
+
+TEST_F(SeriesReader, takes_the_offset_of_exchanges_not_their_stamps) {
+  // 300 ns ahead over 1,000 ns of path; the third request was lost.
+  const std::string_view stamps =
+      "t1,t2,t3,t4\n"
+      "1700000000000000000,1700000000000001300,1700000000000500300,1700000000000501000\n"
+      "1700000000125000000,1700000000125001300,1700000000125500300,1700000000125501000\n"
+      "1700000000250000000,1700000000250001300,,\n"
+      "1700000000375000000,1700000000375001310,1700000000375500310,1700000000375501000\n";
+  const auto series = read(stamps);
+  ASSERT_TRUE(series.ok()) << series.error().text();
+  EXPECT_EQ(series->kind, RecordKind::kOffset);
+  EXPECT_EQ(series->interval_s, 0.125);
+  ASSERT_EQ(series->values.size(), 4U);
+  EXPECT_NEAR(series->values[0], 300e-9, 1e-15);
+  EXPECT_NEAR(series->values[3], 310e-9, 1e-15);
+
+  SeriesOptions options;
+  options.unit = "us";
+  EXPECT_NE(error(stamps, options).find("--unit is for tables"), std::string::npos);
+  options.column = "t2";
+  EXPECT_TRUE(read(stamps, options).ok()) << "a column by its name is a table's";
+}
+
 TEST_F(SeriesReader, says_what_was_expected_and_what_came) {
   EXPECT_EQ(error(""), ": the file is empty: expected numbers or a log of linuxptp");
   EXPECT_EQ(error("# only\n# comments\n"),

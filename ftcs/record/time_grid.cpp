@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "ftcs/analysis/line_fit.h"
+#include "ftcs/analysis/statistics.h"
 #include "ftcs/record/fields.h"
 
 namespace ftcs {
@@ -22,9 +25,7 @@ double median_step(std::span<const double> times_s) {
   std::vector<double> steps;
   steps.reserve(times_s.size());
   for (std::size_t i = 1; i < times_s.size(); ++i) steps.push_back(times_s[i] - times_s[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return upper_median(std::move(steps));
 }
 
 /// Number of the place of each time on a grid of about `step`, from 0.
@@ -45,52 +46,21 @@ double shortest_within(double value, double tolerance) {
   return value;
 }
 
-struct Slope {
-  double value = 0.0;
-  double deviation = 0.0;  ///< standard deviation, from the scatter about the line
-};
-
-/// Least squares of the times over their places.
-Slope slope_of(std::span<const double> times_s, std::span<const double> places) {
-  const auto count = static_cast<double>(places.size());
-  double mean_place = 0.0;
-  double mean_time = 0.0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    mean_place += places[i] / count;
-    mean_time += (times_s[i] - times_s[0]) / count;
-  }
-  double squares = 0.0;
-  double products = 0.0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    squares += (places[i] - mean_place) * (places[i] - mean_place);
-    products += (places[i] - mean_place) * (times_s[i] - times_s[0] - mean_time);
-  }
-  Slope slope{products / squares, 0.0};
-  double scatter = 0.0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const double residual =
-        times_s[i] - times_s[0] - mean_time - slope.value * (places[i] - mean_place);
-    scatter += residual * residual / count;
-  }
-  slope.deviation = std::sqrt(scatter / squares);
-  return slope;
-}
-
 /// The step of times that may be rounded: 62.5 ms stamped in ms are steps of 62 and 63. The median
 /// step counts the places, a straight line through them is the interval, and of what the scatter
 /// about the line permits the shortest number is meant.
 double typical_step(std::span<const double> times_s) {
   const double median = median_step(times_s);
   if (!(median > 0.0)) return median;
-  Slope slope{median, 0.0};
+  LineFit line{.slope = median};
   constexpr int kRounds = 3;  // a long gap has its places only when the step is nearly right
   for (int round = 0; round < kRounds; ++round) {
-    slope = slope_of(times_s, places_of(times_s, slope.value));
+    line = fit_line(times_s, places_of(times_s, line.slope));
     // Farther off the places themselves are in doubt: jitter as long as the interval.
-    if (!(std::abs(slope.value - median) < 0.5 * median)) return median;
+    if (!(std::abs(line.slope - median) < 0.5 * median)) return median;
   }
   constexpr double kDeviations = 3.0;
-  return shortest_within(slope.value, kDeviations * slope.deviation);
+  return shortest_within(line.slope, kDeviations * line.slope_deviation);
 }
 
 }  // namespace

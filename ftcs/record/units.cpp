@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <utility>
+
+#include "ftcs/record/fields.h"
 
 namespace ftcs {
 namespace {
@@ -56,9 +57,7 @@ std::string name_in_heading(std::string_view heading) {
                               [](char c) { return kAround.find(c) != std::string_view::npos; })
                  .base(),
              name.end());
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
-  return name;
+  return lower_case(name);
 }
 
 }  // namespace ftcs

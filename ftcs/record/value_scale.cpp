@@ -2,10 +2,12 @@
 #include "ftcs/record/value_scale.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <sstream>
 
+#include <fmt/core.h>
+
+#include "ftcs/analysis/statistics.h"
+#include "ftcs/record/fields.h"
 #include "ftcs/record/units.h"
 
 namespace ftcs {
@@ -17,20 +19,7 @@ constexpr double kLargestFraction = 0.1;
 constexpr double kLargestSteadyPhase = 1000.0;
 constexpr double kSteady = 1e-3;
 
-std::string lower(std::string_view text) {
-  std::string copy(text);
-  std::transform(copy.begin(), copy.end(), copy.begin(),
-                 [](unsigned char byte) { return static_cast<char>(std::tolower(byte)); });
-  return copy;
-}
-
-std::string text_of(double value) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(12);
-  text << value;
-  return text.str();
-}
+std::string text_of(double value) { return fmt::format("{:.12g}", value); }
 
 Result<ValueScale, std::string> scale_of_hertz(const SeriesOptions& options,
                                                const std::string& unit, double hertz) {
@@ -43,22 +32,12 @@ Result<ValueScale, std::string> scale_of_hertz(const SeriesOptions& options,
                     "values: frequency in " + unit + ", nominal " + text_of(nominal) + " Hz"};
 }
 
-double median_of(std::span<const double> values) {
-  std::vector<double> known;
-  std::copy_if(values.begin(), values.end(), std::back_inserter(known),
-               [](double value) { return std::isfinite(value); });
-  if (known.empty()) return 0.0;
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  return *middle;
-}
-
 }  // namespace
 
 RecordKind kind_of(const SeriesOptions& options, std::string_view heading) {
   if (options.kind) return *options.kind;
   const std::string unit = options.unit.empty() ? unit_in_heading(heading) : options.unit;
-  const std::string word = lower(heading);
+  const std::string word = lower_case(heading);
   if (fraction_of_unit(unit) || hertz_of_unit(unit) || word.find("freq") != std::string::npos)
     return RecordKind::kFrequency;
   return word.find("offset") != std::string::npos ? RecordKind::kOffset : RecordKind::kPhase;
@@ -96,7 +75,8 @@ Result<ValueScale, std::string> choose_scale(const SeriesOptions& options, Recor
 std::string suspicion_of_hertz(std::span<const double> values, RecordKind kind,
                                const SeriesOptions& options) {
   if (!options.unit.empty() || options.nominal_hz) return {};
-  const double median = median_of(values);
+  const double median = upper_median({values.begin(), values.end()});
+  if (!std::isfinite(median)) return {};
   if (kind == RecordKind::kFrequency && std::abs(median) > kLargestFraction) {
     return "expected fractional frequencies, got values near " + text_of(median) +
            ": a record in Hz needs --unit Hz --nominal F (--unit 1 takes it as it is)";

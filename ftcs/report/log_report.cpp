@@ -14,7 +14,13 @@
 namespace ftcs {
 namespace {
 
-std::string usage_text(const experiment::RecordedLog& log) {
+std::vector<std::string> notes_of(const RecordedLog& log) {
+  std::vector<std::string> notes = log.notes;
+  notes.insert(notes.end(), log.replay_notes.begin(), log.replay_notes.end());
+  return notes;
+}
+
+std::string usage_text(const RecordedLog& log) {
   return fmt::format(
       "{}: {} lines, {} used, {} not usable; {} pairs, one forward message in {:.6g} s", log.format,
       log.lines, log.used, log.unusable, log.pairs.size(), log.interval_s);
@@ -113,7 +119,7 @@ Table log_table(const LogComparison& comparison) {
 std::string log_console(const LogComparison& comparison) {
   const auto& log = comparison.log;
   std::string text = fmt::format("{}\n{}\n", comparison.file, usage_text(log));
-  for (const auto& note : log.notes) text += note + "\n";
+  for (const auto& note : notes_of(log)) text += note + "\n";
   for (const auto& line : log.examples)
     text += fmt::format("line {} not used: {}\n", line.number, line.text);
   if (!log.has_truth) text += "no truth column: ranked by the measured offset\n";
@@ -158,7 +164,7 @@ Json log_json(const LogComparison& comparison, const std::string& version) {
                 {"pairs", log.pairs.size()},
                 {"interval_s", log.interval_s},
                 {"truth", log.has_truth},
-                {"notes", log.notes}}},
+                {"notes", notes_of(log)}}},
               {"servos", std::move(servos)}};
 }
 
@@ -168,7 +174,7 @@ std::string log_html(const LogComparison& comparison, const std::string& version
   report.add_plot(offset_plot(comparison));
   if (comparison.log.has_truth) report.add_plot(error_plot(comparison));
   report.add_note(usage_text(comparison.log));
-  for (const auto& note : comparison.log.notes) report.add_note(note);
+  for (const auto& note : notes_of(comparison.log)) report.add_note(note);
   for (const auto& line : comparison.log.examples) {
     report.add_note(fmt::format("line {} not used: {}", line.number, line.text), true);
   }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "ftcs/experiment/log_replay.h"
-#include "ftcs/experiment/recorded_log.h"
+#include "ftcs/record/recorded_log.h"
 #include "ftcs/report/json.h"
 #include "ftcs/report/table.h"
 
@@ -14,7 +14,7 @@ namespace ftcs {
 /// A recorded log and what each servo would have made of it.
 struct LogComparison {
   std::string file;
-  experiment::RecordedLog log;
+  RecordedLog log;
   std::vector<experiment::ReplayResult> servos;  ///< best first
 };
 

@@ -2,12 +2,12 @@
 #include "ftcs/report/record_report.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 
 #include <fmt/format.h>
 
+#include "ftcs/record/fields.h"
 #include "ftcs/report/number_format.h"
 
 namespace ftcs {
@@ -32,12 +32,7 @@ std::string confidence_text(double confidence) {
 }
 
 /// Its name in JSON and CSV.
-std::string key(Deviation deviation) {
-  std::string text = name(deviation);
-  for (char& letter : text)
-    letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-  return text;
-}
+std::string key(Deviation deviation) { return lower_case(name(deviation)); }
 
 /// TDEV and TTOTDEV are times, all others are frequencies.
 bool is_time(Deviation deviation) {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/analysis/noise_for_test.h"
+#include "test/support/noise_for_test.h"
 
 namespace ftcs {
 namespace {

@@ -7,8 +7,8 @@ namespace ftcs {
 namespace {
 
 ftcs_servo_time time_of(Duration since_epoch) noexcept {
-  constexpr double kFractionUnit = 1.0 / 4294967296.0;
-  return {since_epoch.floor_ns(), since_epoch.fraction() * kFractionUnit};
+  const std::int64_t whole_ns = since_epoch.floor_ns();
+  return {whole_ns, (since_epoch - Duration::from_whole_ns(whole_ns)).ns()};
 }
 
 bool is_sound(const ftcs_servo_command& command) noexcept {
@@ -47,7 +47,11 @@ ftcs_servo_observation ExternalServo::observe(const TimestampPair& pair,
 }
 
 ServoUpdate ExternalServo::obey(const ftcs_servo_command& command) noexcept {
-  if (!is_sound(command)) return {SampleVerdict::kImplausible, false, {}};
+  if (!is_sound(command)) {
+    if (config_.tally != nullptr) ++config_.tally->unsound;
+    return {SampleVerdict::kImplausible, false, {}};
+  }
+  if (config_.tally != nullptr) ++config_.tally->commands;
   snapshot_.state = ServoState::kLocked;
   ServoUpdate update{SampleVerdict::kUsed, true, {}};
   update.command.correction_rate = Rate::from_ppb(command.correction_rate_ppb);
@@ -61,6 +65,7 @@ ServoUpdate ExternalServo::obey(const ftcs_servo_command& command) noexcept {
 ServoUpdate ExternalServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
   const ftcs_servo_observation seen = observe(pair, now);
   ftcs_servo_command command{};
+  if (config_.tally != nullptr) ++config_.tally->messages;
   switch (config_.functions->update(config_.instance, &seen, &command)) {
     case FTCS_SERVO_COMMAND:
       return obey(command);

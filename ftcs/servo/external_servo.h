@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "ftcs/measurement/path_delay_estimator.h"
@@ -8,6 +9,13 @@
 #include "ftcs/servo/servo.h"
 
 namespace ftcs {
+
+/// What came of the messages that such a servo heard.
+struct ExternalTally {
+  std::uint64_t messages = 0;
+  std::uint64_t commands = 0;  ///< obeyed
+  std::uint64_t unsound = 0;   ///< commands that were not finite, or back in time: not obeyed
+};
 
 /// A servo that lies outside, in a shared library. Neither the table of functions nor the instance
 /// is owned: both must outlive every copy of this configuration and every servo made of it, and an
@@ -17,6 +25,7 @@ struct ExternalConfig {
   void* instance = nullptr;
   PathDelayConfig path_delay{};
   std::optional<Nanoseconds> fixed_path_delay{};
+  ExternalTally* tally = nullptr;  ///< counted there, as long-lived as the instance
 };
 
 /// Feeds ftcs_servo_plugin.h's functions: each message with the path delay and the offset that any

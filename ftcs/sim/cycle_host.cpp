@@ -37,7 +37,7 @@ bool CycleHost::pass(ethercat::ConstBytes frame, bool lost) {
   const auto view = ethercat::FrameView::parse(bytes);
   if (!view) return false;
   const auto passage = segment_.pass(*view, now_);
-  if (!passage.returned) return false;
+  if (!passage.returned || (way_back_ && !way_back_(*view))) return false;
   stamps_.received = shown_at(passage.at);
   return node_->on_frame(bytes, stamps_) != ethercat::FrameOutcome::kIgnored;
 }

@@ -35,6 +35,9 @@ class CycleHost {
   void set_stamp_noise(std::function<Duration()> noise) { noise_ = std::move(noise); }
   /// From reading the clock to the frame on the wire, drawn anew for each cycle.
   void set_stack_delay(std::function<Duration()> delay) { stack_ = std::move(delay); }
+  /// What becomes of a frame on its way back from the drives; false: it is lost.
+  using WayBack = std::function<bool(const ethercat::FrameView&)>;
+  void set_way_back(WayBack way_back) { way_back_ = std::move(way_back); }
   /// Until the cyclic part; false: it came to an end before, node().main().failure() tells why.
   bool bring_up();
   /// One cycle whose task wakes `late` after its trigger, and whose frame does not come back if it
@@ -64,6 +67,7 @@ class CycleHost {
   PlantClock plant_;
   std::function<Duration()> noise_;
   std::function<Duration()> stack_;
+  WayBack way_back_;
   std::array<std::uint8_t, ethercat::kMaxFrameSize> buffer_{};
 };
 

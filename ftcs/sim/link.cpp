@@ -99,6 +99,13 @@ Duration Link::fixed_delay_at(TrueTime t) const noexcept {
   return delay;
 }
 
+double Link::wave_ns(TrueTime t) const {
+  if (!spec_.wave) return 0.0;
+  const double periods = t.since_epoch().seconds() / spec_.wave->period_s;
+  const bool late = periods - std::floor(periods) < 0.5;
+  return (late ? 0.5 : -0.5) * spec_.wave->peak_to_peak_ns;
+}
+
 Arrivals Link::send(TrueTime departure) {
   double noise_ns = jitter_ns();
   const double load_ns = queueing_.wait_ns(departure) + burst_ns(departure);
@@ -108,6 +115,7 @@ Arrivals Link::send(TrueTime departure) {
   const bool copied = fate_.chance(spec_.duplication);
   const bool held = fate_.chance(spec_.reordering);
   if (spike) noise_ns += spec_.spikes.extra_ns;
+  noise_ns += wave_ns(departure);
   Duration delay = fixed_delay_at(departure) + Duration::from_ns(noise_ns);
   if (held) delay += spec_.reordering_hold;
   if (lost || in_outage(departure)) return {};

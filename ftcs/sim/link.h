@@ -73,6 +73,13 @@ struct HostStalls {
   double mean_length_ns = 0.0;
   bool shared = false;  ///< one host takes the stamps of both directions: the same stalls for both
 };
+/// A clock in a PHY or MAC slips by a step of its phase and back: stamps are late by half of
+/// `peak_to_peak_ns` in the first half of each period and early by as much in the second. A mean
+/// of zero; a variance of peak_to_peak_ns^2 / 4.
+struct StampWave {
+  double peak_to_peak_ns = 0.0;
+  double period_s = 1.0;
+};
 /// From `at` on the delay is `extra` longer (or shorter).
 struct DelayStep {
   Duration at;
@@ -92,6 +99,7 @@ struct LinkSpec {
   std::optional<BurstyLoad> bursts;
   Spikes spikes{};
   std::optional<HostStalls> stalls;
+  std::optional<StampWave> wave;
   double loss = 0.0;         ///< probability
   double duplication = 0.0;  ///< probability that a second copy arrives, later by `duplicate_lag`
   Duration duplicate_lag = Nanoseconds{1'000};
@@ -125,6 +133,7 @@ class Link {
   [[nodiscard]] double jitter_ns();
   [[nodiscard]] double burst_ns(TrueTime now);
   [[nodiscard]] double stall_ns(TrueTime arrival);
+  [[nodiscard]] double wave_ns(TrueTime t) const;
   [[nodiscard]] Duration stall_gap();
   [[nodiscard]] bool in_outage(TrueTime now) const noexcept;
 

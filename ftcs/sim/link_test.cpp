@@ -72,6 +72,13 @@ TEST(Link, adds_jitter_of_the_asked_moments) {
   EXPECT_NEAR(mean(send_all(spec).delays_us), 11.0, 0.04);
 }
 
+TEST(Link, a_wave_of_the_stamps_has_a_mean_of_zero_and_half_its_height_as_deviation) {
+  LinkSpec spec = path();
+  spec.wave = StampWave{40.0, 0.37};
+  EXPECT_NEAR(mean(send_all(spec).delays_us), 10.0, 0.001);
+  EXPECT_NEAR(deviation(send_all(spec).delays_us), 0.02, 0.001);
+}
+
 // Pollaczek-Khinchine: the mean wait of M/D/1 is rho service / (2 (1 - rho)).
 TEST(Link, queueing_load_waits_as_an_m_d_1_queue_does) {
   LinkSpec spec = path();

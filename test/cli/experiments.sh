@@ -84,6 +84,12 @@ expect 1 'none.log' compare --log none.log --json old.json
 (timeout -s KILL 1 "$ftcs" simulate endless.toml -q --json old.json) > /dev/null 2>&1
 [ "$(cat old.json)" = precious ] || fail "a run without a result cost the older one"
 rm -f old.json.part
+# A single run of a year ends when it is asked to, with what it has.
+sed 's/^cycles = .*/cycles = 30000000000/; s/seeds = 5/seeds = 1/' good.toml > year.toml
+timeout -s INT -k 60 4 "$ftcs" simulate year.toml -q > /dev/null 2> err
+[ $? -eq 137 ] && fail "a long run did not end at SIGINT"
+grep -q interrupted err || fail "an interrupted run does not say so: $(cat err)"
+expect 2 '--servo adaptve: expected a file or one of' simulate good.toml --servo adaptve
 
 # Logs and records: cut off in the middle, compressed and cut off, no text at all.
 for i in $(seq 400); do echo "$i,$((i * 20000))"; done > data
@@ -92,7 +98,7 @@ gzip -k good.csv
 head -c 900 good.csv.gz > cut.csv.gz
 head -c 20 good.csv > cut.csv
 expect 1 'cut.csv.gz' compare --log cut.csv.gz
-expect 1 'only 1 usable lines of 2; a replay needs three' compare --log cut.csv
+expect 1 'only 1 usable lines of 2; three are needed' compare --log cut.csv
 expect 1 'cut.csv.gz' analyse cut.csv.gz
 expect 1 'empty.toml' analyse empty.toml
 expect 1 'binary.toml' analyse binary.toml

@@ -64,5 +64,16 @@ fi
 python=$(rms py.json my-servo-python)
 [ -n "$python" ] && [ "$python" = "$(rms c.json my-servo-c)" ] || fail "C and Python differ"
 refused "failed or is not there" "$ftcs" compare --servo ./entry.py
+sed 's/    return 1$/    raise ValueError("mine")/' "$in_python" > raises.py
+refused "raises.py: raised in a callback" "$ftcs" compare --seeds 2 --servo ./raises.py
+[ "$(grep -c mine err)" -le 2 ] || fail "the traceback comes more than once: $(wc -l < err) lines"
+sed 's/    if last is None:/    if True:/' "$in_python" > silent.py
+"$ftcs" compare --seeds 2 --servo ./silent.py > out 2> err || fail "a silent servo: $(cat err)"
+grep -q "gave no command in [0-9]* messages" err || fail "a servo without a command is not told: $(cat err)"
+sed 's/    command.correction_time_ns = .*/    command.correction_time_ns = -1.0/' "$in_python" > back.py
+"$ftcs" compare --seeds 2 --servo ./back.py > out 2> err || fail "a servo that goes back: $(cat err)"
+grep -q "were not obeyed" err || fail "commands that were not obeyed are not told: $(cat err)"
+sed 's/b"my-servo-python"/b"adaptive"/' "$in_python" > adaptive.py
+refused "calls itself adaptive" "$ftcs" compare --seeds 2 --servo ./adaptive.py
 refused "one Python script at a time" "$ftcs" compare --servo "$in_python" --servo ./entry.py
 echo "C and Python: $python ns, ftcs-p1 $(rms c.json ftcs-p1) ns"

@@ -175,7 +175,9 @@ for servo in "" "--servo adaptive"; do
   failures=$((failures + 1))
 done
 
-# And already a while after the start: five Announce intervals.
+# And already a while after the start: five Announce intervals. The file is emptied first: what an earlier run said
+# there must not be taken for what this one says, which would end it before it began.
+: > "$folder/out"
 "$ftcs" ptp -i lo "${ports[@]}" --logAnnounceInterval -3 --uds_address none > "$folder/out" &
 holder=$!
 for _ in $(seq 50); do grep -q "no time transmitter was heard" "$folder/out" && break; sleep 0.1; done

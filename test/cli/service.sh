@@ -21,7 +21,8 @@ while True:
 ready_after_lock() {  # NAME
   head -1 "$folder/$1" | grep -q '^STATUS=not locked' || fail "$1: the first word is not why it is not locked"
   [ "$(grep -c '^READY=1' "$folder/$1")" -eq 1 ] || fail "$1: ready is not told exactly once"
-  grep -B1 '^READY=1' "$folder/$1" | grep -q '^STATUS=locked' || fail "$1: ready, but not locked"
+  grep -B1 '^READY=1' "$folder/$1" | grep -qE '^STATUS=(locked: |in phase, but a drive is not in OP)' ||
+    fail "$1: ready, but not locked"
 }
 
 port=$((31000 + $$ % 4000))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Misconfigurations: name, who transmits ("raw": transmitter.py with these faults; "ptp4l": Debian's with these lines),
-the receiver's flags, the cause that must be told and a part of the remedy. Further keys: prepare, a command in our namespace."""
+the receiver's flags, the cause that must be told and a part of the remedy. Further keys: prepare, a command in our namespace;
+second, the faults of another transmitter beside the first."""
 
 
 def case(name, by, faults, flags, cause, remedy, **more):
@@ -40,6 +41,10 @@ CASES = [
     case("no Delay_Resp", "raw", ["delay_resp=0"], [], "no_delay_resp", "do not reach the transmitter"),
     case("Delay_Resp to others", "raw", ["resp_to_others=1"], [], "delay_resp_for_others", "serves others alone"),
     case("two clocks with one identity", "raw", ["twins=1"], [], "two_transmitters", "clockIdentity"),
+    case("two transmitters disagree", "raw", ["priority1=100"], [], "transmitters_disagree", "--acceptable-transmitter",
+         second=["identity=0a0b0cfffe0102ff", "ahead=37.005"]),
+    case("an asymmetric path", "raw", ["priority1=100"], [], "transmitters_disagree", "asymmetric by twice as much",
+         second=["identity=0a0b0cfffe0102ff", "forward_wait=0.01", "domain=1"]),
     case("alternate transmitters alone", "raw", ["alternate=1"], [], "alternate", "transmitter's own settings"),
     case("255 steps from the grandmaster", "raw", ["steps_removed=255"], [], "unusable_announce", "--clockIdentity"),
     case("malformed", "raw", ["truncate=1"], [], "malformed", "the transmitter is at fault"),
@@ -51,4 +56,5 @@ CASES = [
     case("no such adapter clock", None, [], ["-H"], "other", "hardware"),
 ]
 # A receiver that nothing stands in the way of is locked: else the table above would show nothing.
-GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], [], "locked", "")]
+GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], [], "locked", ""),
+        case("two transmitters agree", "ptp4l", [], [], "locked", "", second=["domainNumber 1", "clockIdentity 0a0b0c.fffe.0102ff"])]

@@ -57,13 +57,15 @@ class Network:
         self.processes.append(subprocess.Popen(["ip", "netns", "exec", namespace, *command], stdout=log, stderr=log))
 
     def transmit(self, case):
-        if case["by"] == "raw":
-            self.start(self.theirs, sys.executable, os.path.join(HERE, "transmitter.py"), self.peer, *case["faults"])
-        elif case["by"] == "ptp4l":
-            config = os.path.join(self.folder, "ptp4l.conf")
-            with open(config, "w") as file:
-                file.write("\n".join(PTP4L + [f"uds_address {self.folder}/uds"] + case["faults"]) + "\n")
-            self.start(self.theirs, "ptp4l", "-f", config, "-i", self.peer, "-m", "-q")
+        for number, faults in enumerate(faults for faults in (case["faults"], case.get("second")) if faults is not None):
+            if case["by"] == "raw":
+                self.start(self.theirs, sys.executable, os.path.join(HERE, "transmitter.py"), self.peer, *faults)
+            elif case["by"] == "ptp4l":
+                config = os.path.join(self.folder, f"ptp4l{number}.conf")
+                with open(config, "w") as file:
+                    file.write("\n".join(PTP4L + [f"uds_address {self.folder}/uds{number}"] + faults) + "\n")
+                self.start(self.theirs, "ptp4l", "-f", config, "-i", self.peer, "-m", "-q")
+        if case["by"] == "ptp4l":
             time.sleep(2.5)  # LISTENING until its Announce timeout
 
 
@@ -86,7 +88,7 @@ def examine(ftcs, number, case):
     if case["remedy"].lower() not in done.stdout.lower():
         wrong.append(f"no word of '{case['remedy']}'")
     good = case["cause"] == "locked"
-    if sentence.startswith("locked") != good or (not good and not sentence.startswith("not locked: ")):
+    if sentence.startswith("locked") != good or (not good and not sentence.startswith(("not locked: ", "in doubt: "))):
         wrong.append("locked or not?")
     if done.returncode != (0 if good else 3):
         wrong.append(f"exit code {done.returncode}")

@@ -12,7 +12,7 @@ import time
 DEFAULTS = dict(transport="UDPv4", domain=0, sdo=0, version=2, vlan=0, group="", source="10.77.0.2", flags=0x0C, utc_offset=37,
                 ahead=37.0, announce=1, sync=1, follow_up=1, delay_resp=1, pdelay_req=0, pdelay_resp=0, resp_to_others=0,
                 unicast="", identity="0a0b0cfffe010203", twins=0, steps_removed=0, truncate=0, wander=0.0, priority1=128,
-                turn=0, alternate=0)
+                turn=0, alternate=0, forward_wait=0.0)
 UDP = {"UDPv4": 0x0800, "UDPv6": 0x86DD}
 GROUPS = {"UDPv4": "01:00:5e:00:01:81", "UDPv6": "33:33:00:00:01:81", "L2": "01:1b:19:00:00:00"}
 SYNC, DELAY_REQ, PDELAY_REQ, PDELAY_RESP, FOLLOW_UP, DELAY_RESP, PDELAY_RESP_FOLLOW_UP, ANNOUNCE = 0, 1, 2, 3, 8, 9, 10, 11
@@ -91,6 +91,7 @@ class Transmitter:
         self.sequence += 1
         if s["sync"]:
             origin = self.now()
+            time.sleep(s["forward_wait"])  # a path that takes longer in one direction
             self.send(self.message(SYNC, self.sequence, b"\0" * 10, 0x0200), True)
             if s["follow_up"]:
                 self.send(self.message(FOLLOW_UP, self.sequence, self.stamp(origin), 0, 2), False)

@@ -20,11 +20,11 @@ class Plant {
   static constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
 
   Plant(std::int64_t interval_ns, double rate_ppb, std::int64_t offset_ns, double noise_ns,
-        std::uint64_t seed = 0)
+        std::uint64_t seed = 0, std::uint32_t nominal = kNominal)
       : interval_(Fine{interval_ns} * kFineNs),
         rate_ppb_(rate_ppb),
         noise_(noise_ns),
-        clock_(kNominal, 0, Fine{kEpoch + offset_ns} * kFineNs),
+        clock_(nominal, 0, Fine{kEpoch + offset_ns} * kFineNs),
         unaligned_(seed != 0),
         random_(seed + 1),
         moments_(seed) {}
@@ -43,6 +43,7 @@ class Plant {
     const auto bent = static_cast<Fine>(duration_of(gap).ns() * rate_ppb_ * 1e-9 * 4294967296.0);
     event_ = event_ + gap + bent;  // the oscillator is fast by rate_ppb
   }
+  void set_interval_ns(std::int64_t interval_ns) { interval_ = Fine{interval_ns} * kFineNs; }
   void set_rate_ppb(double ppb) { rate_ppb_ = ppb; }
   [[nodiscard]] double rate_ppb() const { return rate_ppb_; }
 

@@ -163,8 +163,10 @@ int main(void) {
   config.dwell = 2;
   run("jumps, band", &config, SAMPLES / 10);
   run_followed("ftcs, band", &config, SAMPLES / 10);
+#if !defined(FTCS_ADDEND_BARE)
   config = ftcs_addend_quiet_config(NOMINAL);
   run("jumps, quiet mode", &config, SAMPLES / 10);
   run_followed("quiet mode", &config, SAMPLES / 10);
+#endif
   return 0;
 }

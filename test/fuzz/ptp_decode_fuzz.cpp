@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "ftcs/ptp/wire/authentication.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "test/fuzz/require.h"
 
@@ -19,6 +20,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(message.error().expected != message.error().received, "expected and received differ");
     require(!to_string(message.error().reason).empty(), "a reason has a name");
     return 0;
+  }
+  const auto tlv = find_authentication(octets);
+  if (tlv) {
+    require(tlv->covered + tlv->code_octets <= size, "the code lies inside the message");
+    require(tlv->code_octets > 0 && tlv->code_octets <= kMaximumCodeSize, "it is a code");
   }
   const auto bytes = encode(*message);
   require(bytes.ok(), "what was read can be written");

@@ -26,6 +26,7 @@ class Script : PtpScript {
  public:
   explicit Script(std::span<const std::uint8_t> octets)
       : PtpScript(octets), config_(profile(octets.empty() ? std::uint8_t{0} : octets.back())) {
+    config_.security = keys();
     receiver_ = TimeReceiver(config_);
     check(receiver_.start(now_));
   }
@@ -110,8 +111,10 @@ class Script : PtpScript {
     check(receiver_.on_general_message(message.view(), now_));
   }
   void event(const Message& message) {
-    const auto bytes = encode(message);
-    if (bytes) check(receiver_.on_event_message(bytes->view(), stamp(), now_));
+    auto bytes = encode(message);
+    if (!bytes) return;
+    authenticate(*bytes);
+    check(receiver_.on_event_message(bytes->view(), stamp(), now_));
   }
   FollowUp follow_up() {
     FollowUp body{time()};
@@ -123,8 +126,10 @@ class Script : PtpScript {
     return body;
   }
   void general(const Message& message) {
-    const auto bytes = encode(message);
-    if (bytes) check(receiver_.on_general_message(bytes->view(), now_));
+    auto bytes = encode(message);
+    if (!bytes) return;
+    authenticate(*bytes);
+    check(receiver_.on_general_message(bytes->view(), now_));
   }
   Message message(const Body& body, bool answer = false) {
     Message message;
@@ -175,6 +180,10 @@ class Script : PtpScript {
         const auto sent = decode(send->bytes.view());
         require(sent.ok() && sent->header.source == kUs,
                 "what it sends is well-formed and its own");
+        require(config_.security == nullptr ||
+                    ftcs::ptp::authenticate(*config_.security, send->bytes.view()) ==
+                        Authenticity::kAuthentic,
+                "and authentic where there are keys");
         const MessageType type = type_of(sent->body);
         const bool request = type == MessageType::kDelayReq || type == MessageType::kPdelayReq;
         require(
@@ -205,6 +214,8 @@ class Script : PtpScript {
   void check_counters() {
     const Counters& counters = receiver_.counters();
     require_growth(counters);
+    require(config_.security != nullptr || counters[Counter::kReplayed] == 0, "keys alone refuse");
+    require(counters[Counter::kNotSealed] == 0, "each message has a code");
     require(counters[Counter::kForwardPairs] == forward_, "forward pairs are counted");
     require(counters[Counter::kBackwardPairs] == backward_, "backward pairs are counted");
     require(counters[Counter::kPeerDelays] == peer_delays_, "peer delays are counted");

@@ -11,6 +11,7 @@
 #include "ftcs/ptp/wire/byte_order.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "test/fuzz/require.h"
+#include "test/fuzz/sum_code.h"
 
 namespace ftcs::ptp {
 
@@ -46,6 +47,19 @@ class PtpScript {
     if (choice < 64) return Duration::from_whole_ns(choice);
     if (choice < 128) return Duration::from_whole_ns(-std::int64_t{choice});
     return Duration::from_scaled_ns(std::int64_t{choice} << 55);
+  }
+  /// The last octet but one says whether the port has keys.
+  [[nodiscard]] const SecurityAssociation* keys() const {
+    const bool wanted = octets_.size() > 1 && octets_[octets_.size() - 2] % 4 == 3;
+    return wanted ? &keys_.association : nullptr;
+  }
+  /// Most messages to a port with keys have a code; the interval says whether.
+  void authenticate(MessageBytes& bytes) {
+    constexpr std::size_t kInterval = 33;
+    if (keys() == nullptr || bytes.octets[kInterval] % 16 == 1) return;
+    keys_.association.active_key_id = bytes.octets[kInterval] % 16 == 2 ? 1 : 2;
+    fuzz::require(seal(keys_.association, bytes), "the code fits behind each message");
+    keys_.association.active_key_id = 2;
   }
   /// Near the right time, a jump away, or at an end of what a Timestamp can hold.
   ReferenceTime time() {
@@ -84,6 +98,7 @@ class PtpScript {
   std::span<const std::uint8_t> octets_;
   ByteReader reader_;
   Counters before_;
+  SumAssociation keys_;
 };
 
 }  // namespace ftcs::ptp

@@ -27,6 +27,7 @@ class Script : PtpScript {
  public:
   explicit Script(std::span<const std::uint8_t> octets)
       : PtpScript(octets), config_(profile(octets.empty() ? std::uint8_t{0} : octets.back())) {
+    config_.security = keys();
     transmitter_ = TimeTransmitter(config_);
     check(transmitter_.start(now_));
   }
@@ -123,14 +124,17 @@ class Script : PtpScript {
     check(transmitter_.on_general_message(message.view(), now_));
   }
   void event(const Message& message) {
-    const auto bytes = encode(message);
+    auto bytes = encode(message);
     if (!bytes) return;
+    authenticate(*bytes);
     ask(bytes->view());
     check(transmitter_.on_event_message(bytes->view(), stamp(), now_));
   }
   void general(const Message& message) {
-    const auto bytes = encode(message);
-    if (bytes) check(transmitter_.on_general_message(bytes->view(), now_));
+    auto bytes = encode(message);
+    if (!bytes) return;
+    authenticate(*bytes);
+    check(transmitter_.on_general_message(bytes->view(), now_));
   }
   void ask(std::span<const std::uint8_t> bytes) {
     const auto request = decode(bytes);
@@ -175,6 +179,8 @@ class Script : PtpScript {
         require(abs(delay->mean_link_delay) <= Duration{2 * kMaximumPeerDelay},
                 "a peer delay is one");
         require(std::abs(delay->neighbor_rate_ratio.deviation()) < 0.1, "a rate is one");
+      } else if (const auto* other = std::get_if<TransmitterSeen>(&action)) {
+        require(other->port != kUs, "another transmitter is another");
       } else {
         require(false, "a transmitter follows nobody");
       }
@@ -185,6 +191,10 @@ class Script : PtpScript {
   void check_sent(const SendMessage& send) {
     const auto sent = decode(send.bytes.view());
     require(sent.ok(), "what it sends can be decoded");
+    require(config_.security == nullptr ||
+                ftcs::ptp::authenticate(*config_.security, send.bytes.view()) ==
+                    Authenticity::kAuthentic,
+            "and is authentic where there are keys");
     const Header& header = sent->header;
     const MessageType type = type_of(sent->body);
     require(header.source == kUs && header.major_sdo_id == config_.major_sdo_id, "it is its own");

@@ -141,6 +141,26 @@ def corrections(wire, i):
     wire.send(bytes(sync))
 
 
+MIXED = [rogue_10s, syncs_an_hour_ahead, replay_3s, early_follow_ups, corrections, delay_resp_log7, seq_lockout, utc_and_timescale, odd_identities]
+
+
+def soak(wire, i):
+    """Half of each minute, all of these in turn and garbage. The transmitter sends 128 Syncs a second."""
+    if time.monotonic() % 60 < 30:
+        return
+    kind = i % (len(MIXED) + 1)
+    if kind == len(MIXED):
+        wire.send(os.urandom(random.randrange(1, 200)))
+    else:
+        MIXED[kind](wire, i // (len(MIXED) + 1))
+
+
+def size_of(process):
+    """Resident KiB, open files."""
+    status = open(f"/proc/{process.pid}/status").read()
+    return int(status.split("VmRSS:")[1].split()[0]), len(os.listdir(f"/proc/{process.pid}/fd"))
+
+
 # name: frames a second, what, samples a second at least, microseconds at most, while it lasts
 ATTACKS = {
     "seq_lockout": (2, seq_lockout, 1, 300), "delay_resp_log7": (2, delay_resp_log7, 6, 300),
@@ -150,10 +170,12 @@ ATTACKS = {
     "replay_3s": (10, replay_3s, 1, 100), "early_follow_ups": (8, early_follow_ups, 1, 450), "corrections": (10, corrections, 0, 100),
     "jumps": (250, jumps, 0, None), "odd_identities": (10, odd_identities, 6, 300),
 }
+RECOVERY = 20  # Syncs
+LONG = {"soak": (20, soak, 1, 100)}  # by name alone
 
 
 def run(name, wire):
-    rate, attack, least, limit = ATTACKS[name]
+    rate, attack, least, limit = {**ATTACKS, **LONG}[name]
     path = f"{FOLDER}/chrony.sock"
     feed = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     feed.bind(path)
@@ -162,7 +184,7 @@ def run(name, wire):
     inside = ["ip", "netns", "exec"]
     common = ["-S", "--logAnnounceInterval", "0", "--uds_address", "none", "--tx_timestamp_timeout", "50"]
     transmitter = subprocess.Popen(
-        [*inside, THEIRS, FTCS, "ptp", "-i", THEIR_IF, "--role", "time-transmitter", "--logSyncInterval", "-3", "--clockIdentity",
+        [*inside, THEIRS, FTCS, "ptp", "-i", THEIR_IF, "--role", "time-transmitter", "--logSyncInterval", "-7" if name in LONG else "-3", "--clockIdentity",
          "020000.fffe.000001", *common], stdout=subprocess.DEVNULL)
     with open(log_path, "w") as log:
         victim = subprocess.Popen(
@@ -184,6 +206,10 @@ def run(name, wire):
 
     pass_time(time.monotonic() + 7)
     begin, lines, wire.requests, sent = time.monotonic(), sum(1 for _ in open(log_path)), 0, 0
+    if name in LONG:  # the first half minute is part of the start
+        pass_time(begin + min(30, SECONDS / 4))
+        begin = time.monotonic()
+    size = size_of(victim)
 
     def act():
         nonlocal sent
@@ -195,6 +221,7 @@ def run(name, wire):
     end, requests, lines = time.monotonic(), wire.requests, sum(1 for _ in open(log_path)) - lines
     pass_time(end + 10)
     alive = victim.poll() is None
+    grown = [now - before for now, before in zip(size_of(victim), size)] if alive else [0, 0]
     for process in (victim, transmitter):
         process.send_signal(signal.SIGINT)
     ended = victim.wait(timeout=5)
@@ -205,10 +232,15 @@ def run(name, wire):
     after = [abs(error) for at, error in samples if at >= end + 7]
     before = [abs(error) for at, error in samples if at < begin]
     worst = max(during, default=0.0)
+    # Samples are fed while the clock is locked: the first one with a small error ends the recovery.
+    sync_s = 2.0 ** (-7 if name in LONG else -3)
+    back = next((at - end for at, error in samples if at >= end and abs(error) <= 100), 99) / sync_s
     good = (alive and ended == 0 and len(before) > 5 and len(during) >= least * SECONDS and (limit is None or worst <= limit)
-            and len(after) > 8 and max(after) <= 300 and lines <= 10 * SECONDS + 10 and requests <= 20 * SECONDS)
+            and len(after) > 8 and max(after) <= 300 and lines <= 10 * SECONDS + 10 and requests <= 20 * SECONDS
+            and back <= RECOVERY and grown[0] <= 1024 and grown[1] <= 0)
     print(f"{'ok    ' if good else 'FAILED'} {name:22} samples/s {len(during) / SECONDS:5.1f}  worst us {worst:9.1f}  after {max(after, default=-1):7.1f}"
-          f"  lines/s {lines / SECONDS:5.1f}  Delay_Req/s {requests / SECONDS:5.1f}  exit {ended}  samples before {len(before)}, after {len(after)}", flush=True)
+          f"  lines/s {lines / SECONDS:5.1f}  Delay_Req/s {requests / SECONDS:5.1f}  exit {ended}  samples before {len(before)}, after {len(after)}"
+          f"  grown {grown[0]} KiB, {grown[1]} files  back after {back:.0f} Syncs", flush=True)
     if not good:
         print(open(log_path).read()[-4000:])
     return good

@@ -43,6 +43,26 @@ inside sh -c 'cd /tmp && cp -r /usr/share/doc/libftcs-dev/examples e && gunzip -
   c++ -std=c++20 -I.. 01_lock_a_clock.cpp -o one $(pkg-config --cflags --libs ftcs) && ./one | tail -1; rc=$?; rm -rf /tmp/e; exit $rc' ||
   fail "example 01 does not build against the package"
 
+# An older version, with a file of the configuration that its owner has changed, and a program that runs.
+mkdir "$root/older"
+dpkg-deb -R "$folder"/ftcs_*.deb "$root/older/tree"
+sed -i 's/^Version: .*/Version: 0.0.1/' "$root/older/tree/DEBIAN/control"
+dpkg-deb --root-owner-group -b "$root/older/tree" "$root/older/ftcs.deb" > /dev/null
+inside dpkg -i --force-downgrade /older/ftcs.deb > "$root/log" 2>&1 || { cat "$root/log"; fail "an older version"; }
+rm -rf "$root/older"
+echo 'domainNumber 7' >> "$root/etc/ftcs/ptp.conf"
+inside ftcs ptp -i lo -S --event-port 42319 --general-port 42320 --uds_address none --duration 60 > "$root/running" 2>&1 &
+running=$!
+sleep 2
+inside sh -c 'apt-get install -y -qq --no-install-recommends /packages/ftcs_*.deb' < /dev/null > "$root/log" 2>&1 ||
+  { cat "$root/log"; fail "upgrade"; }
+grep -q '^domainNumber 7' "$root/etc/ftcs/ptp.conf" || fail "the upgrade took a setting away"
+kill -0 "$running" || fail "the upgrade ended a running program"
+wait "$running" || [ $? -eq 3 ] || { cat "$root/running"; fail "the program that ran over the upgrade"; }
+inside ftcs ptp -f /etc/ftcs/ptp.conf -i no-such-if > "$root/said" 2>&1 && fail "no interface is no error"
+grep -q 'interface no-such-if: no such device' "$root/said" || { cat "$root/said"; fail "an unclear error"; }
+rm -f "$root/running" "$root/said"
+
 inside apt-get remove -y -qq ftcs libftcs-dev > "$root/log" 2>&1 || { cat "$root/log"; fail "apt remove"; }
 [ ! -e "$root/usr/bin/ftcs" ] || fail "the program is still there"
 [ -e "$root/etc/ftcs/ptp.conf" ] || fail "remove took the configuration, which is for purge"

@@ -15,6 +15,7 @@ add_systemd() {  # ROOT
   cp "$packaging"/systemd/*@.service "$root/usr/lib/systemd/system/"
   cp "$packaging/systemd/ftcs.sysusers" "$root/usr/lib/sysusers.d/ftcs.conf"
   cp "$packaging"/etc/*.conf "$root/etc/ftcs/"
+  add_module "$root" veth  # a wire for drives in software
   # No journal and no bus: the job's own output is what is looked at.
   printf '[Manager]\nDefaultStandardOutput=null\nShowStatus=no\n' > "$root/etc/systemd/system.conf"
   printf '[Unit]\nRequires=basic.target\nWants=job.service\nAfter=basic.target\n' > "$root/etc/systemd/system/default.target"

@@ -24,6 +24,7 @@ processes = []
 
 def start(*command):
     processes.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+    return processes[-1]
 
 
 def demand(true, what):
@@ -41,7 +42,8 @@ def start_daemons(ftcs):
     start(ftcs, "ethercat-segment", "--udp", str(PORT + 5), "--drives", "4", "--priority", "0")
     time.sleep(0.5)
     start(ftcs, "ethercat", "run", "--udp", f"127.0.0.1:{PORT + 5}", "--cycle", "4ms", "--sync-interval", "200ms", "--gate", "2ms",
-          "--duration", "0", "--drift-pulses", "500", "--priority", "0", "-q", "--web", str(PORT + 8))
+          "--duration", "0", "--drift-pulses", "500", "--priority", "0", "--lost-frame-limit", "1000", "--unlocked-limit", "1000", "-q",
+          "--web", str(PORT + 8))
 
 
 def drawn(name):
@@ -79,6 +81,35 @@ def live(browser, folder):
         except urllib.error.HTTPError as error:
             demand(error.code == 405, f"{method}: {error.code}")
     print("three daemons on one page, locked, drawn, silent console; phone and dark")
+
+
+def wakes_up(browser):
+    """A page that lost its daemon, and found too many others listening when it came back, shows it again by itself."""
+    daemon = processes[1]
+    command = daemon.args
+    lost = 'document.querySelector("section.daemon").dataset.mode === "lost"'
+    browser.open("about:blank")  # its listener is gone within a second
+    time.sleep(1.5)
+    browser.open(f"http://127.0.0.1:{PORT + 8}/")
+    browser.until('document.querySelector("section.daemon")?.dataset.mode === "locked"', 30)
+    daemon.terminate()
+    daemon.wait()
+    browser.until(lost)
+    start(*command)
+    listeners = []
+    end = time.monotonic() + 20
+    while len(listeners) < 4 and time.monotonic() < end:
+        try:
+            listeners.append(urllib.request.urlopen(f"http://127.0.0.1:{PORT + 8}/events", timeout=5))
+        except OSError:
+            time.sleep(0.02)
+    time.sleep(4)  # the browser has asked again by itself, and was refused
+    browser.until(lost)
+    for listener in listeners:
+        listener.close()
+    browser.until('document.querySelector("section.daemon").dataset.mode === "locked"', 40)
+    browser.console()  # refused connections are told there, rightly
+    print("the page comes back by itself: daemon ended, started again, four other listeners before it")
 
 
 class FastDaemon(http.server.BaseHTTPRequestHandler):
@@ -153,6 +184,7 @@ def main():
     try:
         live(browser, folder)
         fast(browser)
+        wakes_up(browser)
     finally:
         browser.close()
         for process in processes:

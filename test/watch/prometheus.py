@@ -35,7 +35,8 @@ def start_daemons(ftcs, folder):
     start(ftcs, "ethercat-segment", "--udp", str(PORT + 3), "--drives", "4", "--priority", "0")
     time.sleep(0.5)
     start(ftcs, "ethercat", "run", "--udp", f"127.0.0.1:{PORT + 3}", "--cycle", "4ms", "--sync-interval", "200ms", "--gate", "2ms",
-          "--duration", "0", "--drift-pulses", "500", "--priority", "0", "-q", "--metrics", str(PORT + 4))
+          "--duration", "0", "--drift-pulses", "500", "--priority", "0", "--lost-frame-limit", "1000", "--unlocked-limit", "1000", "-q",
+          "--metrics", str(PORT + 4))
 
 
 def start_prometheus(folder):

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
@@ -13,10 +14,11 @@
 #include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
 #include "apps/ftcs/watch_arguments.h"
-#include "ftcs/daemon/ethercat/cycle_laws.h"
-#include "ftcs/daemon/ethercat/ethercat_run.h"
-#include "ftcs/daemon/ethercat/run_status.h"
 #include "ftcs/daemon/exit_code.h"
+#include "ftcs/fieldbus/cycle_laws.h"
+#include "ftcs/fieldbus/ethercat_run.h"
+#include "ftcs/fieldbus/rights.h"
+#include "ftcs/fieldbus/run_status.h"
 
 namespace ftcs::app {
 
@@ -30,18 +32,24 @@ struct EthercatArguments {
   Nanoseconds band{5'000};
   Nanoseconds gate{200'000};
   Nanoseconds lock{5'000};
+  std::optional<double> lock_percent;  ///< of the cycle, in the place of `lock`
   std::vector<double> gains;
   bool slew = false;
 };
 
 /// A duration with its unit, of so many nanoseconds at least.
 CLI::Option* add_time(CLI::App& command, const char* flag, Nanoseconds& target, std::int64_t lowest,
-                      const char* help) {
-  const auto read = [flag, &target, lowest](const std::string& text) {
+                      const char* help,
+                      std::int64_t highest = std::numeric_limits<std::int64_t>::max()) {
+  const auto read = [flag, &target, lowest, highest](const std::string& text) {
     const auto value = parse_duration(text);
     if (!value) throw CLI::ValidationError(flag, value.error().message);
     if (value->floor_ns() < lowest) {
       throw CLI::ValidationError(flag, fmt::format("'{}' is too small", text));
+    }
+    if (value->floor_ns() > highest) {
+      throw CLI::ValidationError(
+          flag, fmt::format("'{}' is too large: at most {} ms", text, highest / 1'000'000));
     }
     target = Nanoseconds{value->rounded_ns()};
   };
@@ -52,6 +60,7 @@ template <class Value>
 CLI::Option* add_choice(CLI::App& command, const char* flag, Value& target,
                         const std::map<std::string, Value>& choices, const char* help) {
   std::vector<std::string> names;
+  names.reserve(choices.size());
   for (const auto& [name, value] : choices) names.push_back(name);
   const auto read = [&target, choices](const std::string& text) { target = choices.at(text); };
   return command.add_option_function<std::string>(flag, read, help)->check(CLI::IsMember(names));
@@ -110,6 +119,47 @@ std::optional<std::string> check_drive_sync(const daemon::RunOptions& options) {
   return std::nullopt;
 }
 
+/// "bridge" or "bridge:POSITION": plant time is not a clock of this host.
+std::optional<std::string> read_bridge(daemon::RunOptions& options) {
+  constexpr std::string_view kName = "bridge";
+  const std::string_view source = options.plant_time;
+  if (!source.starts_with(kName)) return std::nullopt;
+  options.bridge = ethercat::bridge::kFirst;
+  if (source.size() > kName.size()) {
+    const std::string position{source.substr(kName.size() + 1)};
+    const auto number = parse_integer(position, 0, ethercat::kMaxSubDevices - 1);
+    if (source[kName.size()] != ':' || !number) {
+      return fmt::format("--plant-time: '{}' is not bridge or bridge:POSITION, as in bridge:4",
+                         source);
+    }
+    options.bridge = static_cast<std::size_t>(*number);
+  }
+  if (options.bus_write == node::BusWrite::kOffset) return std::nullopt;
+  return "--bus-write: target-time and read-time write a clock of this host, which a bridge "
+         "terminal is not";
+}
+
+/// "5us", or "20%" of the cycle, which is known at the end alone.
+void read_in_sync_limit(const std::string& text, EthercatArguments& arguments) {
+  const auto wrong = [&text] {
+    return CLI::ValidationError(
+        "--in-sync-limit",
+        fmt::format("'{}' is neither a time above zero, as 5us, nor a part of the cycle of at most "
+                    "25%, as 20%",
+                    text));
+  };
+  if (text.ends_with('%')) {
+    const auto percent = parse_number(text.substr(0, text.size() - 1), 1e-3, 25.0);
+    if (!percent) throw wrong();
+    arguments.lock_percent = *percent;
+    return;
+  }
+  const auto time = parse_duration(text);
+  if (!time || time->floor_ns() < 1) throw wrong();
+  arguments.lock = Nanoseconds{time->rounded_ns()};
+  arguments.lock_percent.reset();
+}
+
 /// What hangs on several flags.
 std::optional<std::string> complete(EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
@@ -117,7 +167,14 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   servo.largest_lateness = servo.largest_round_trip = arguments.gate;
   servo.band = {arguments.band, arguments.band};
   constexpr std::int64_t kLeaveOverEnter = 4;
-  servo.lock.band = {arguments.lock, arguments.lock * kLeaveOverEnter};
+  if (arguments.lock_percent) {
+    const double part = *arguments.lock_percent / 100.0;
+    arguments.lock = Nanoseconds{std::llround(part * static_cast<double>(servo.cycle.count()))};
+  }
+  // A phase is at most half a cycle.
+  const Nanoseconds leave =
+      std::max(arguments.lock, std::min(arguments.lock * kLeaveOverEnter, servo.cycle * 9 / 20));
+  servo.lock.band = {arguments.lock, leave};
   servo.cycles_per_sync =
       static_cast<std::uint32_t>(std::max<std::int64_t>(1, arguments.sync_interval / servo.cycle));
   servo.align_at_start = !arguments.slew;
@@ -125,6 +182,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   if (options.bus_mode != node::BusMode::kFollow && options.plant_time.empty()) {
     return "--bus-mode: lead and external need --plant-time, the clock that is to be followed";
   }
+  if (auto wrong = read_bridge(options)) return wrong;
   if (auto wrong = check_drive_sync(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
@@ -146,7 +204,7 @@ int with_options(EthercatArguments arguments, Run run) {
   std::string& socket = arguments.options.status_socket;
   arguments.options.status_socket_given = !socket.empty();
   if (socket.empty()) socket = platform::writable_socket_path(daemon::kEthercatSocketName);
-  if (const auto wrong = confine_to(rights_of(arguments.options), arguments.rights)) {
+  if (const auto wrong = confine_to(daemon::rights_of(arguments.options), arguments.rights)) {
     fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
     return kRuntimeError;
   }
@@ -171,10 +229,11 @@ void add_servo_flags(CLI::App& command, EthercatArguments& arguments) {
   daemon::RunOptions& options = arguments.options;
   CycleServoConfig& servo = options.servo;
   constexpr std::int64_t kShortestCycle = 50'000;
+  constexpr std::int64_t kLongestCycle = 1'000'000'000;  // a drive's watchdog waits no longer
   command.add_option("--servo", arguments.servo, "ftcs (default), pics, adaptive, soem-pi or none")
       ->check(CLI::IsMember(std::vector<std::string>(daemon::cycle_law_names().begin(),
                                                      daemon::cycle_law_names().end())));
-  add_time(command, "--cycle", servo.cycle, kShortestCycle, "default 1ms");
+  add_time(command, "--cycle", servo.cycle, kShortestCycle, "default 1ms", kLongestCycle);
   add_time(command, "--sync-interval", arguments.sync_interval, 1,
            "ftcs and pics act once in this time; default 500ms");
   command.add_option("--offset-gain", servo.offset_gain, "ftcs: p inside the band")
@@ -189,8 +248,11 @@ void add_servo_flags(CLI::App& command, EthercatArguments& arguments) {
   add_time(command, "--timer-resolution", servo.resolution, 1, "10us is the paper's timer");
   add_time(command, "--transit", servo.transit, 0, "from the transmit stamp to the reference");
   add_time(command, "--gate", arguments.gate, 0, "largest lateness and round trip; default 200us");
-  add_time(command, "--lock-band", arguments.lock, 1,
-           "locked within this phase, lost beyond four times of it; default 5us");
+  command.add_option_function<std::string>(
+      "--in-sync-limit,--lock-band",
+      [&arguments](const std::string& text) { read_in_sync_limit(text, arguments); },
+      "locked within this phase, lost beyond four times of it: a time, as 5us (default), or a part "
+      "of the cycle, as 20%");
   command.add_flag("--slew", arguments.slew, "the servo removes the first phase, no jump");
 }
 
@@ -249,7 +311,8 @@ void add_sync_flags(CLI::App& command, daemon::RunOptions& options) {
 void add_plant_time_flags(CLI::App& command, daemon::RunOptions& options) {
   command.add_option("--plant-time", options.plant_time,
                      "ptp:INTERFACE (a PTP receiver of this process), tai (CLOCK_TAI), realtime, "
-                     "aux0 to aux7 (CLOCK_AUX), or a PTP hardware clock such as /dev/ptp0");
+                     "aux0 to aux7 (CLOCK_AUX), a PTP hardware clock such as /dev/ptp0, or "
+                     "bridge[:POSITION] (the time stamps of a bridge terminal on the wire)");
   command.add_option_function<std::string>(
       "--ptp-config",
       [&options](const std::string& file) {

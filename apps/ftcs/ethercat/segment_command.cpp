@@ -9,7 +9,8 @@
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
-#include "ftcs/daemon/ethercat/segment_server.h"
+#include "ftcs/fieldbus/rights.h"
+#include "ftcs/fieldbus/segment_server.h"
 #include "ftcs/platform/stop_flag.h"
 
 namespace ftcs::app {
@@ -86,6 +87,13 @@ std::optional<std::string> complete(SegmentArguments& arguments) {
     if (!value || *value < Duration{}) return fmt::format("'{}' is no delay, as in 50ns", *text);
     *target = Nanoseconds{value->floor_ns()};
   }
+  if (options.bridge && *options.bridge >= options.drives) {
+    return fmt::format("--bridge: {}: there are SubDevices 0 to {} only", *options.bridge,
+                       options.drives - 1);
+  }
+  if (options.bridge && options.clock_bits != 64) {
+    return "--bridge: a bridge terminal needs --clock-bits 64";
+  }
   for (const std::string& text : arguments.faults) {
     daemon::SegmentFault fault;
     if (auto wrong = parse_fault(text, fault)) return wrong;
@@ -111,8 +119,8 @@ int run_segment(SegmentArguments arguments) {
   if (arguments.priority > 0) {
     static_cast<void>(platform::make_realtime(arguments.priority, arguments.cpu));
   }
-  const auto rights = rights_of_segment(!options.interface.empty(),
-                                        !options.json.empty() || !options.clock_csv.empty());
+  const auto rights = daemon::rights_of_segment(
+      !options.interface.empty(), !options.json.empty() || !options.clock_csv.empty());
   if (const auto wrong = confine_to(rights, arguments.rights)) {
     fmt::print(stderr, "ftcs ethercat-segment: {}\n", *wrong);
     return kRuntimeError;
@@ -155,6 +163,12 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
                       "cut:N@S, mend:N@S, restart:N@S or skew:N@S=PPM; may be repeated");
   command->add_flag("!--sign-bit-behind", options.sign_bit_means_ahead,
                     "bit 31 of 0x092C set when the drive's copy is behind, not ahead");
+  command
+      ->add_option("--clock-bits", options.clock_bits,
+                   "of the distributed clocks: 64 (default), 32, or 0: there are none")
+      ->check(CLI::IsMember({0U, 32U, 64U}));
+  command->add_option("--bridge", options.bridge,
+                      "this SubDevice is a bridge terminal; its other side shows CLOCK_REALTIME");
   command->add_option("--seed", options.seed, "of crystals and losses");
   command->add_option("--duration", options.duration_s, "stop after so many seconds");
   command->add_option("--priority", arguments->priority, "SCHED_FIFO priority")

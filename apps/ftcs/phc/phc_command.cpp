@@ -15,6 +15,7 @@
 #include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/phc/phc_options.h"
 #include "ftcs/daemon/phc/phc_runner.h"
+#include "ftcs/daemon/rights.h"
 
 namespace ftcs::app {
 namespace {
@@ -287,7 +288,8 @@ void add_phc_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
-    if (const auto wrong = confine_to(rights_of(options), arguments->rights, &options.once_open)) {
+    if (const auto wrong =
+            confine_to(daemon::rights_of(options), arguments->rights, &options.once_open)) {
       fmt::print(stderr, "ftcs phc: {}\n", *wrong);
       exit_code = kRuntimeError;
       return;

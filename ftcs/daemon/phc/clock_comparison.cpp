@@ -50,13 +50,6 @@ Result<Comparison, platform::OsError> ClockComparison::read(int readings) {
                     source.delay_ns + sink.delay_ns};
 }
 
-bool ClockComparison::is_exact() const {
-  const auto exact = [](const std::optional<CrossTimestamper>& timestamper) {
-    return !timestamper || timestamper->method() == CrossMethod::kPrecise;
-  };
-  return exact(source_) && exact(sink_);
-}
-
 std::string ClockComparison::method() const {
   std::string text;
   for (const auto* timestamper : {&source_, &sink_}) {

@@ -29,8 +29,6 @@ class ClockComparison {
       const platform::ClockDevice& sink);
 
   [[nodiscard]] Result<Comparison, platform::OsError> read(int readings);
-  /// No reading has a delay: the hardware latches both clocks at once.
-  [[nodiscard]] bool is_exact() const;
   /// "extended", or both methods of two hardware clocks.
   [[nodiscard]] std::string method() const;
 

@@ -19,14 +19,14 @@ using platform::ClockDevice;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
-node::ClockFollowerConfig follower_config(const PhcOptions& options, bool exact) {
+node::ClockFollowerConfig follower_config(const PhcOptions& options) {
   node::ClockFollowerConfig follower;
   DisciplineConfig& config = follower.discipline;
   config.servo = options.servo;
   config.largest_rate_change = options.steering.largest_rate_change;
   config.servo.sync_interval =
       Nanoseconds{static_cast<std::int64_t>(static_cast<double>(kNsPerSecond) / options.rate_hz)};
-  if (exact) config.servo.two_way.fixed_path_delay = Nanoseconds{0};
+  config.servo.two_way.fixed_path_delay = Nanoseconds{0};  // ReadingMessages has taken it off
   config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
   config.servo.linuxptp_pi.step_threshold = options.step_threshold;
   if (options.step_threshold > Nanoseconds{0}) {
@@ -95,7 +95,7 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       source_(std::move(clocks.source)),
       sink_(std::move(clocks.sink)),
       comparison_(std::move(clocks.comparison)),
-      follower_(follower_config(options, comparison_.is_exact()), sink_->clock()) {
+      follower_(follower_config(options), sink_->clock()) {
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
   if (options.sink_ahead_s) {
     const int ahead_of_utc = sink_->is_system() ? -*options.sink_ahead_s : UtcConfig{}.utc_offset;
@@ -193,8 +193,10 @@ int PhcRunner::run() {
         on_silence();
       }
     }
-    const auto wrong = sink_->attend(discipline().counters().commands > 0, discipline().locked(),
-                                     discipline().latest().servo);
+    ServoSnapshot servo = discipline().latest().servo;
+    servo.path_delay = half_width_;
+    const auto wrong =
+        sink_->attend(discipline().counters().commands > 0, discipline().locked(), servo);
     if (wrong) fail(*wrong);
     follow_scale_change();
     const std::int64_t now_ns = kernel_.clock_ns(CLOCK_MONOTONIC_RAW);
@@ -240,6 +242,7 @@ void PhcRunner::publish(std::int64_t raw_ns, bool follows) {
   state.kind.set("phc");
   state.target.set(sink_->name());
   state.reference.set(source_.name());
+  if (discipline().latest().servo.offset_known) state.delay_ns = half_width_.ns();
   state.uptime_s = static_cast<double>(raw_ns - start_ns_) / static_cast<double>(kNsPerSecond);
   observers_->feed().publish(state);
 }
@@ -285,18 +288,14 @@ void PhcRunner::take_sample() {
   const Duration offset = offset_from_reference(sink_->clock().local_of(comparison->sink_ns),
                                                 ReferenceTime::from_ns(comparison->source_ns));
   const std::uint64_t steps = discipline().counters().steps;
-  if (!comparison_.is_exact()) feed(Direction::kBackward, *comparison, *instant);
-  feed(Direction::kForward, *comparison, *instant);
+  // A classic servo takes the middle of every reading, as phc2sys does.
+  const bool weighs_lateness = options_.servo.kind == ServoKind::kAdaptive;
+  for (const auto& message : messages_.of(*comparison, weighs_lateness)) {
+    follower_.on_pair({message.direction, message.source, *instant}, std::nullopt);
+    take_notes();
+  }
+  half_width_ = Duration::from_whole_ns(comparison->delay_ns).half();
   if (!failure_) report(offset, comparison->delay_ns, discipline().counters().steps > steps);
-}
-
-void PhcRunner::feed(Direction direction, const Comparison& comparison, FreeRunningTime instant) {
-  const Duration half = Duration::from_whole_ns(comparison.delay_ns).half();
-  const auto source = ReferenceTime::from_ns(comparison.source_ns);
-  follower_.on_pair(
-      {direction, direction == Direction::kForward ? source - half : source + half, instant},
-      std::nullopt);
-  take_notes();
 }
 
 void PhcRunner::on_silence() {

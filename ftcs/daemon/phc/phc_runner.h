@@ -9,6 +9,7 @@
 #include "ftcs/daemon/phc/clock_comparison.h"
 #include "ftcs/daemon/phc/phc_options.h"
 #include "ftcs/daemon/phc/port_watch.h"
+#include "ftcs/daemon/phc/reading_messages.h"
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/run_summary.h"
 #include "ftcs/daemon/service_report.h"
@@ -25,9 +26,10 @@ namespace ftcs::daemon {
 
 /// One clock of the kernel that follows another of the same machine.
 ///
-/// Each comparison is a two-way exchange: the reading before the source was latched and the one
-/// after it bound the instant from both sides, and what either took longer than usual is delay, as
-/// a packet's. So a slow reading counts for less by itself, and for nothing as an outlier.
+/// The reading before the source was latched and the one after it bound the instant from both
+/// sides: its middle is a message without delay, and what a reading took longer than usual is
+/// delay, as a packet's. So a slow reading counts for less by itself, and for nothing as an
+/// outlier.
 class PhcRunner {
  public:
   /// Opens what the options name. The error is one line for the user; no clock has been touched.
@@ -63,7 +65,6 @@ class PhcRunner {
   void on_silence();
   void take_notes();
   void take_sample();
-  void feed(Direction direction, const Comparison& comparison, FreeRunningTime instant);
   void report(Duration offset, std::int64_t delay_ns, bool stepped);
   void fail(const std::string& reason);
   [[nodiscard]] int finish();
@@ -74,6 +75,8 @@ class PhcRunner {
   platform::ClockDevice source_;
   std::unique_ptr<RealClock> sink_;
   ClockComparison comparison_;
+  ReadingMessages messages_;
+  Duration half_width_{};  ///< of the last comparison: what an asymmetry of it may hide
   node::ClockFollower follower_;
   std::optional<PortWatch> watch_;
   std::optional<Pairing> pairing_;

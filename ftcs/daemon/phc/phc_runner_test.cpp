@@ -12,9 +12,9 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
-#include "ftcs/platform/fake_clocks.h"
-#include "ftcs/platform/fake_preemption.h"
 #include "ftcs/platform/local_socket.h"
+#include "test/support/fake_clocks.h"
+#include "test/support/fake_preemption.h"
 
 namespace ftcs::daemon {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/phc/phc_runner.h"
-#include "ftcs/platform/fake_clocks.h"
+#include "test/support/fake_clocks.h"
 
 namespace ftcs::daemon {
 namespace {

@@ -117,6 +117,16 @@ void write_clock(Exposition& out, const WatchState& state) {
   out.counter("ftcs_holdovers", "Times that the reference was silent", state.holdovers);
 }
 
+void write_messages(Exposition& out, const WatchedMessages& messages) {
+  out.counter("ftcs_messages_authentic", "PTP messages by a key of ours", messages.authentic);
+  out.counters("ftcs_messages_dropped", "PTP messages that were not authentic, or copies",
+               {{label("reason", "missing"), static_cast<double>(messages.missing)},
+                {label("reason", "unknown_key"), static_cast<double>(messages.unknown_key)},
+                {label("reason", "wrong_code"), static_cast<double>(messages.wrong_code)},
+                {label("reason", "unsupported"), static_cast<double>(messages.unsupported)},
+                {label("reason", "replayed"), static_cast<double>(messages.replayed)}});
+}
+
 void write_tdev(Exposition& out, const std::vector<StabilityPoint>& tdev) {
   std::vector<Exposition::Sample> samples;
   for (const StabilityPoint& point : tdev) {
@@ -184,6 +194,7 @@ std::string metrics_text(const MetricsInput& input, MetricsNames names, MetricsF
   Exposition out(input.state, format);
   write_clock(out, input.state);
   write_tdev(out, input.tdev);
+  if (input.state.messages.present) write_messages(out, input.state.messages);
   write_cycle(out, input.state.cycle);
   return out.take();
 }

@@ -31,6 +31,22 @@ void expect_line(const std::string& text, const std::string& line) {
   EXPECT_NE(text.find(line + "\n"), std::string::npos) << line << " is not in\n" << text;
 }
 
+TEST(Metrics, of_a_port_with_keys_tell_why_messages_were_dropped) {
+  WatchState state = locked();
+  EXPECT_EQ(text(state).find("ftcs_messages"), std::string::npos);
+  state.messages = {.present = true,
+                    .authentic = 70,
+                    .missing = 1,
+                    .unknown_key = 2,
+                    .wrong_code = 3,
+                    .unsupported = 4,
+                    .replayed = 5};
+  const std::string said = text(state);
+  expect_line(said, "ftcs_messages_authentic_total{clock=\"ptp:eth0\"} 70");
+  expect_line(said, "ftcs_messages_dropped_total{clock=\"ptp:eth0\",reason=\"wrong_code\"} 3");
+  expect_line(said, "ftcs_messages_dropped_total{clock=\"ptp:eth0\",reason=\"replayed\"} 5");
+}
+
 TEST(Metrics, figures_are_in_base_units) {
   const std::string said = text(locked());
   expect_line(said, "ftcs_offset_seconds{clock=\"ptp:eth0\"} -5.0000000000000004e-08");

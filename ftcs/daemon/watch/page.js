@@ -1,6 +1,7 @@
 "use strict";
 // Each daemon of this host is a section with a ring of points; nothing grows with time.
 const kPoints = 6000;
+const kRetry_ms = 3000;
 const kColumns = 6;  // time s, offset ns, sigma ns, rate ppb, delay ns, used
 const kModes = { locked: "locked", acquiring: "acquiring", holdover: "holdover", freerun: "free run" };
 const kAlStates = { 1: "INIT", 2: "PREOP", 3: "BOOT", 4: "SAFEOP", 8: "OP" };
@@ -46,7 +47,9 @@ class Plot {
     const c = this.context = this.canvas.getContext("2d");
     c.setTransform(scale, 0, 0, scale, 0, 0);
     c.clearRect(0, 0, width, height);
-    const left = 62, right = width - 6, top = 6, bottom = height - 18;
+    c.font = "11px system-ui, sans-serif";
+    const labels = ticks(y, 5).map((tick) => c.measureText(format.y(tick)).width);
+    const left = Math.ceil(Math.max(52, ...labels)) + 10, right = width - 6, top = 6, bottom = height - 18;
     const along = (axis, from, to) => (value) => {
       const v = axis.log ? Math.log10(Math.max(value, 1e-300)) : value;
       const low = axis.log ? Math.log10(axis.low) : axis.low, high = axis.log ? Math.log10(axis.high) : axis.high;
@@ -54,7 +57,6 @@ class Plot {
     };
     this.x = along(x, left, right);
     this.y = along(y, bottom, top);
-    c.font = "11px system-ui, sans-serif";
     c.fillStyle = color("faint");
     c.strokeStyle = color("line");
     c.lineWidth = 1;
@@ -109,6 +111,9 @@ class Daemon {
     this.plots = {};
     for (const canvas of this.section.querySelectorAll("canvas")) this.plots[canvas.className] = new Plot(canvas);
     byId("daemons").append(this.section);
+    this.connect(origin);
+  }
+  connect(origin) {
     this.source = new EventSource(origin + "/events");
     this.source.addEventListener("state", (event) => this.tell(JSON.parse(event.data)));
     this.source.addEventListener("points", (event) => {
@@ -116,11 +121,16 @@ class Daemon {
       this.dirty = true;
     });
     this.source.onopen = () => { this.ring.clear(); };
-    this.source.onerror = () => this.lost();
+    this.source.onerror = () => {
+      this.lost();
+      // A refusal, as of one listener too many, is final to a browser; what slept wakes up to it.
+      if (this.source.readyState === EventSource.CLOSED) setTimeout(() => this.connect(origin), kRetry_ms);
+    };
   }
   lost() {
     this.part(".dot").className = "dot";
-    this.part(".sentence").textContent = "this daemon does not answer any more";
+    this.section.dataset.mode = "lost";
+    this.part(".sentence").textContent = "this daemon does not answer (it has ended, or too many pages are open); trying again";
   }
   part(selector) { return this.section.querySelector(selector); }
   tell(state) {
@@ -173,7 +183,13 @@ class Daemon {
   }
   offsets(first, time) {
     const ring = this.ring, log = byId("log").checked, values = [];
-    for (let i = first; i < ring.size; ++i) if (isFinite(ring.at(i, 1))) values.push(log ? Math.max(Math.abs(ring.at(i, 1)), 0.1) : ring.at(i, 1));
+    for (let i = first; i < ring.size; ++i) {
+      const offset = ring.at(i, 1), sigma = ring.at(i, 2);
+      if (!isFinite(offset)) continue;
+      if (log) values.push(Math.max(Math.abs(offset), 0.1));
+      else if (isFinite(sigma)) values.push(offset - 3 * sigma, offset + 3 * sigma);
+      else values.push(offset);
+    }
     let range = robust(values);
     if (log) {
       const low = values.length ? Math.min(...values) : 0.1, high = values.length ? Math.max(...values) : 1;

@@ -50,7 +50,9 @@ Result<std::unique_ptr<Watch>, std::string> Watch::open(const WatchOptions& opti
   std::unique_ptr<Watch> watch(new Watch(options));  // the constructor is private
   if (auto wrong = watch->listen()) return *wrong;
   if (!options.metrics_file.empty()) {
-    if (auto wrong = platform::write_durably(options.metrics_file, "")) return *wrong;
+    if (auto wrong =
+            platform::write_durably(options.metrics_file, "", platform::Readers::kEverybody))
+      return *wrong;
   }
   sigset_t all;
   sigset_t before;
@@ -212,7 +214,8 @@ std::string Watch::metrics(MetricsFormat format) {
 void Watch::write_file() {
   if (options_.metrics_file.empty()) return;
   // A disk that is full now may not be in ten seconds; the file's age tells.
-  (void)platform::write_durably(options_.metrics_file, metrics(MetricsFormat::kPrometheus));
+  (void)platform::write_durably(options_.metrics_file, metrics(MetricsFormat::kPrometheus),
+                                platform::Readers::kEverybody);
 }
 
 /// Ports of this host at which another daemon shows itself.

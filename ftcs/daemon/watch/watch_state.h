@@ -62,6 +62,17 @@ struct WatchedCycle {
   std::array<WatchedDrive, kDrives> drive{};
 };
 
+/// Of a port with keys (16.14): how many messages were authentic, and why others were dropped.
+struct WatchedMessages {
+  bool present = false;
+  std::uint64_t authentic = 0;
+  std::uint64_t missing = 0;
+  std::uint64_t unknown_key = 0;
+  std::uint64_t wrong_code = 0;
+  std::uint64_t unsupported = 0;
+  std::uint64_t replayed = 0;
+};
+
 /// What is known now. A plain value: the loop copies it for those who watch.
 struct WatchState {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -83,6 +94,7 @@ struct WatchState {
   std::uint64_t implausible = 0;
   std::uint64_t steps = 0;
   std::uint64_t holdovers = 0;
+  WatchedMessages messages{};
   WatchedCycle cycle{};
 };
 static_assert(std::is_trivially_copyable_v<WatchState> && std::is_trivially_copyable_v<WatchPoint>);

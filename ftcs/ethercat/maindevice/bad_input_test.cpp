@@ -3,7 +3,7 @@
 // comes back. Whatever it is, the bring-up ends with one failure that names it, or goes on.
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/test/main_bench.h"
+#include "test/support/main_bench.h"
 
 namespace ftcs::ethercat {
 namespace {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "ftcs/ethercat/maindevice/bridge_terminal.h"
+
 namespace ftcs::ethercat {
 
 namespace {
@@ -40,6 +42,8 @@ void Configurator::start(const ConfiguratorConfig& config) noexcept {
   device_ = 0;
   sync0_start_ = 0;
   deadline_set_ = false;
+  has_shift_ = false;
+  first_toggle_.reset();
 }
 
 void Configurator::start_one(const ConfiguratorConfig& config, std::size_t position) noexcept {
@@ -49,28 +53,38 @@ void Configurator::start_one(const ConfiguratorConfig& config, std::size_t posit
   device_ = position;
 }
 
-bool Configurator::concerns(const SubDeviceInfo& device) const noexcept {
+std::span<const SdoDownload> Configurator::objects_of(const Network& network) const noexcept {
+  return device_ == network.bridge ? std::span<const SdoDownload>{bridge::kObjects}
+                                   : config_.objects;
+}
+
+bool Configurator::concerns(const Network& network) const noexcept {
+  const SubDeviceInfo& device = network.devices[device_];
   switch (step_) {
     case Step::kMailboxes:
       return device.sii.receive.size > 0;
     case Step::kObjects:
-      return device.sii.coe() && !config_.objects.empty();
+      return device.sii.coe() && !objects_of(network).empty();
     case Step::kSizes:
       return device.sii.coe() && end_ == kAll;
+    case Step::kBridgeSafeOp:
+    case Step::kAwaitBridge:
+    case Step::kBridgeTime:
+      return device_ == network.bridge && end_ == kAll;
     case Step::kAlign:
-      return has_wanted_ && end_ == kAll && device.dc();
+      return (has_wanted_ || has_shift_) && end_ == kAll && device.dc();
     case Step::kSync0:
-      return config_.sync0 && device.dc();
+      return config_.sync0 && device.dc() && device_ != network.bridge;
     default:
       return true;
   }
 }
 
-void Configurator::begin() noexcept {
+void Configurator::begin(const Network& network) noexcept {
   deadline_set_ = false;
   if (step_ == Step::kObjects) {
     object_ = 0;
-    sdo_.start_download(config_.objects[0], config_.sdo_timeout);
+    sdo_.start_download(objects_of(network)[0], config_.sdo_timeout);
   }
   if (step_ == Step::kSizes) {
     walk_ = MappingWalk{};
@@ -96,8 +110,8 @@ Progress Configurator::advance(Network& network, Failure& failure) noexcept {
         continue;
       }
     }
-    if (!concerns(network.devices[device_])) continue;
-    begin();
+    if (!concerns(network)) continue;
+    begin(network);
     return Progress::kContinue;
   }
 }
@@ -119,10 +133,12 @@ void Configurator::request(FrameWriter& writer, const Network& network) noexcept
       writer.add_value(device.target(kFpwr, reg::kAlControl), std::uint16_t{2});
       break;
     case Step::kRequestSafeOp:
+    case Step::kBridgeSafeOp:
       writer.add_value(device.target(kFpwr, reg::kAlControl), std::uint16_t{4});
       break;
     case Step::kAwaitPreOp:
     case Step::kAwaitSafeOp:
+    case Step::kAwaitBridge:
       writer.add(device.target(kFprd, reg::kAlStatus), kAlStatusSize);
       break;
     case Step::kObjects:
@@ -131,6 +147,10 @@ void Configurator::request(FrameWriter& writer, const Network& network) noexcept
       break;
     case Step::kChannels:
       write_channels(writer, device);
+      break;
+    case Step::kBridgeTime:
+      writer.add(device.target(kFprd, process_channel(device, kInputManager, 0).start),
+                 bridge::kInputSize);
       break;
     case Step::kReferenceTime:
       writer.add(network.devices[network.reference].target(kFprd, reg::kSystemTime), 8);
@@ -186,7 +206,7 @@ void Configurator::write_sync0(FrameWriter& writer, const SubDeviceInfo& device)
 Progress Configurator::take_reference_time(ConstBytes system_time, Network& network,
                                            Failure& failure) noexcept {
   const auto shown = load<std::uint64_t>(system_time, 0);
-  if (!has_wanted_ || end_ != kAll) {
+  if ((!has_wanted_ && !has_shift_) || end_ != kAll) {
     plan_sync0(shown);
     return Progress::kDone;
   }
@@ -194,10 +214,30 @@ Progress Configurator::take_reference_time(ConstBytes system_time, Network& netw
     return fail(failure, {.kind = FailureKind::kNarrowClock,
                           .position = static_cast<std::uint16_t>(network.reference)});
   }
-  const auto wanted = static_cast<std::uint64_t>(wanted_.since_epoch().rounded_ns());
+  const auto wanted =
+      has_shift_ ? shown + shift_ : static_cast<std::uint64_t>(wanted_.since_epoch().rounded_ns());
   for (SubDeviceInfo& device : network.all()) device.system_time_offset += wanted - shown;
   plan_sync0(wanted);
   return Progress::kDone;
+}
+
+/// Two pairs of stamps, so that the terminal is known to run: the second one counts.
+Progress Configurator::take_bridge_time(const Datagram& inputs, FreeRunningTime now,
+                                        Failure& failure) noexcept {
+  if (inputs.working_counter() == 1) {
+    const auto stamps = bridge::Inputs::decode(inputs.data());
+    if (!stamps.alone && !first_toggle_) first_toggle_ = stamps.updated;
+    if (!stamps.alone && *first_toggle_ != stamps.updated) {
+      has_shift_ = true;
+      shift_ = stamps.external - stamps.internal;
+      return Progress::kDone;
+    }
+  }
+  if (!deadline_set_) deadline_ = now + config_.bridge_timeout;
+  deadline_set_ = true;
+  if (now < deadline_) return Progress::kContinue;
+  return fail(failure, {.kind = FailureKind::kBridgeSilent,
+                        .position = static_cast<std::uint16_t>(device_)});
 }
 
 /// A whole multiple of the cycle, so that the phase is the same after each start, plus the shift.
@@ -218,13 +258,17 @@ Progress Configurator::reply(const FrameView& frame, Network& network, FreeRunni
       progress = await(frame, device, AlState::kPreOp, now, failure);
       break;
     case Step::kAwaitSafeOp:
+    case Step::kAwaitBridge:
       progress = await(frame, device, AlState::kSafeOp, now, failure);
       break;
     case Step::kObjects:
-      progress = objects(frame, now, failure);
+      progress = objects(frame, network, now, failure);
       break;
     case Step::kSizes:
       progress = sizes(frame, device, now, failure);
+      break;
+    case Step::kBridgeTime:
+      progress = take_bridge_time(frame[0], now, failure);
       break;
     default:
       if (frame[0].working_counter() != 1) {
@@ -253,16 +297,17 @@ Progress Configurator::await(const FrameView& frame, SubDeviceInfo& device, AlSt
                .code = device.code});
 }
 
-Progress Configurator::objects(const FrameView& frame, FreeRunningTime now,
+Progress Configurator::objects(const FrameView& frame, const Network& network, FreeRunningTime now,
                                Failure& failure) noexcept {
+  const std::span<const SdoDownload> wanted = objects_of(network);
   const Progress progress = sdo_.reply(frame, device_, now, failure);
-  if (progress == Progress::kFailed && can_do_without(config_.objects[object_], failure)) {
+  if (progress == Progress::kFailed && can_do_without(wanted[object_], failure)) {
     failure = Failure{};
   } else if (progress != Progress::kDone) {
     return progress;
   }
-  if (++object_ == config_.objects.size()) return Progress::kDone;
-  sdo_.start_download(config_.objects[object_], config_.sdo_timeout);
+  if (++object_ == wanted.size()) return Progress::kDone;
+  sdo_.start_download(wanted[object_], config_.sdo_timeout);
   return Progress::kContinue;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "ftcs/ethercat/maindevice/network.h"
@@ -37,6 +38,10 @@ struct ConfiguratorConfig {
   std::span<const DriveSync> drive_sync;
   Nanoseconds state_timeout{2'000'000'000};
   Nanoseconds sdo_timeout{1'000'000'000};
+  /// A bridge terminal tells plant time (bridge::choose()): it is brought to SAFEOP before the
+  /// others, and all clocks are put where its other side is. No value: nobody is asked.
+  std::optional<std::size_t> bridge;
+  Nanoseconds bridge_timeout{30'000'000'000};
 };
 
 /// Logical address of the process image; outputs first, inputs behind them.
@@ -76,6 +81,9 @@ class Configurator {
     kObjects,
     kSizes,
     kChannels,
+    kBridgeSafeOp,
+    kAwaitBridge,
+    kBridgeTime,
     kReferenceTime,
     kAlign,
     kSync0,
@@ -95,16 +103,19 @@ class Configurator {
     std::uint32_t bits = 0;
   };
 
-  [[nodiscard]] bool concerns(const SubDeviceInfo& device) const noexcept;
+  [[nodiscard]] bool concerns(const Network& network) const noexcept;
+  [[nodiscard]] std::span<const SdoDownload> objects_of(const Network& network) const noexcept;
   /// The next SubDevice that this step concerns, or the next step. Done after the last.
   [[nodiscard]] Progress advance(Network& network, Failure& failure) noexcept;
-  void begin() noexcept;
+  void begin(const Network& network) noexcept;
   void write_channels(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
   void write_sync0(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
   [[nodiscard]] Progress await(const FrameView& frame, SubDeviceInfo& device, AlState wanted,
                                FreeRunningTime now, Failure& failure) noexcept;
-  [[nodiscard]] Progress objects(const FrameView& frame, FreeRunningTime now,
-                                 Failure& failure) noexcept;
+  [[nodiscard]] Progress objects(const FrameView& frame, const Network& network,
+                                 FreeRunningTime now, Failure& failure) noexcept;
+  [[nodiscard]] Progress take_bridge_time(const Datagram& inputs, FreeRunningTime now,
+                                          Failure& failure) noexcept;
   [[nodiscard]] Progress sizes(const FrameView& frame, SubDeviceInfo& device, FreeRunningTime now,
                                Failure& failure) noexcept;
   [[nodiscard]] bool walk(std::uint32_t value) noexcept;
@@ -128,6 +139,9 @@ class Configurator {
   std::uint64_t sync0_start_ = 0;
   bool has_wanted_ = false;
   ReferenceTime wanted_;
+  bool has_shift_ = false;  ///< the bridge has told how far its other side is ahead: shift_
+  std::uint64_t shift_ = 0;
+  std::optional<bool> first_toggle_;
 };
 
 }  // namespace ftcs::ethercat

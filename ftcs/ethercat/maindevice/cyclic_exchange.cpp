@@ -24,6 +24,7 @@ void CyclicExchange::start(const Network& network) noexcept {
   control_.fill(0);
   takes_part_.fill(false);
   estimate_ = {};
+  told_ = 0;
   offset_changed_ = false;
   writes_offset_ = false;
   image_size_ = 0;
@@ -64,7 +65,11 @@ void CyclicExchange::request(FrameWriter& writer, const Network& network) noexce
   if (asks_reference(network)) {
     const Bytes time =
         writer.add(network.devices[network.reference].target(kFrmw, reg::kSystemTime), 8);
-    store(time, 0, static_cast<std::uint64_t>(estimate_.since_epoch().rounded_ns()));
+    // Who knows the time to the nanosecond must not take the answer for an echo each time.
+    odd_frame_ = !odd_frame_;
+    const std::int64_t estimate = estimate_.since_epoch().rounded_ns();
+    told_ = static_cast<std::uint64_t>(odd_frame_ ? estimate + 1 : estimate);
+    store(time, 0, told_);
     ++datagrams_;
   }
   wrote_time_ = writes_time_ && asks_reference(network);
@@ -138,10 +143,9 @@ ReferenceTime CyclicExchange::unwrap(ConstBytes data, bool wide) noexcept {
 void CyclicExchange::take_reference(const Datagram& time, const Network& network,
                                     CycleReport& report) noexcept {
   const bool wide = network.devices[network.reference].dc64();
-  const auto sent = static_cast<std::uint64_t>(estimate_.since_epoch().rounded_ns());
   const bool untouched =
-      wide ? load<std::uint64_t>(time.data(), 0) == sent
-           : load<std::uint32_t>(time.data(), 0) == static_cast<std::uint32_t>(sent);
+      wide ? load<std::uint64_t>(time.data(), 0) == told_
+           : load<std::uint32_t>(time.data(), 0) == static_cast<std::uint32_t>(told_);
   report.has_reference = time.working_counter() > 0 && !untouched;
   if (report.has_reference) report.reference = unwrap(time.data(), wide);
 }

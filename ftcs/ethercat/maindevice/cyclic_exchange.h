@@ -94,6 +94,8 @@ class CyclicExchange {
   std::uint16_t whole_ = 0;
   std::array<bool, kMaxSubDevices> takes_part_{};
   ReferenceTime estimate_;
+  std::uint64_t told_ = 0;  ///< of it, in the frame that is out
+  bool odd_frame_ = false;
   bool offset_changed_ = false;
   bool writes_offset_ = false;  ///< in the frame that is out
   ReferenceTime written_time_;

@@ -19,6 +19,8 @@ const char* name_in_operation(FailureKind kind) noexcept {
       return "cycle out of sync with the reference";
     case FailureKind::kNeverLocked:
       return "cycle never in phase with the reference";
+    case FailureKind::kNeverOperational:
+      return "SubDevices did not come to OP in time";
     case FailureKind::kLinkLost:
       return "frames lost";
     default:
@@ -71,6 +73,10 @@ const char* name(FailureKind kind) noexcept {
       return "no SubDevice with a distributed clock";
     case FailureKind::kNarrowClock:
       return "the reference clock has 32 bits only: plant time needs 64";
+    case FailureKind::kNoBridge:
+      return "no bridge terminal with CoE and a clock of 64 bits that could tell plant time";
+    case FailureKind::kBridgeSilent:
+      return "the bridge terminal tells no time: its other side is not connected, or not running";
     default:
       return name_in_operation(kind);
   }

@@ -32,11 +32,14 @@ enum class FailureKind : std::uint8_t {
   kProcessImageTooLarge,  ///< more than one frame holds
   kNoDistributedClock,    ///< nobody can be the reference
   kNarrowClock,           ///< plant time asked for; the reference's system time has 32 bits
+  kNoBridge,              ///< plant time of a bridge terminal asked for; there is none
+  kBridgeSilent,          ///< its other side is not connected, or its stamps stand still
   kReplaced,              ///< what was restarted is not what was scanned: known, found
   kClockNotSteady,        ///< a restarted SubDevice's clock does not follow the reference
   kWorkingCounter,        ///< too many cycles in a row; expected, received
   kSyncLost,              ///< the cycle does not follow the reference any more
   kNeverLocked,           ///< the cycle did not find the reference's phase in time
+  kNeverOperational,      ///< asked for OP, not all SubDevices came to it in time
   kLinkLost,              ///< too many lost frames in a row
 };
 [[nodiscard]] const char* name(FailureKind kind) noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/ethercat/maindevice/main_device.h"
 
+#include "ftcs/ethercat/maindevice/bridge_terminal.h"
 #include "ftcs/time/relabel.h"
 
 namespace ftcs::ethercat {
@@ -198,6 +199,12 @@ FrameOutcome MainDevice::advance(Progress progress) noexcept {
   if (config_.scan_only) {
     stage_ = Stage::kStopped;
     return FrameOutcome::kStopped;
+  }
+  if (config_.needs_reference && !network_.has_reference()) {
+    return advance(fail(failure_, {.kind = FailureKind::kNoDistributedClock}));
+  }
+  if (config_.process.bridge && !bridge::choose(network_, *config_.process.bridge)) {
+    return advance(fail(failure_, {.kind = FailureKind::kNoBridge}));
   }
   configurator_.start(config_.process);
   stage_ = Stage::kConfigure;

@@ -17,6 +17,7 @@ struct MainDeviceConfig {
   std::size_t expected_subdevices = 0;  ///< zero: any number
   bool scan_only = false;               ///< stop in INIT after scan and clock setup
   bool distributed_clocks = true;
+  bool needs_reference = false;  ///< without a distributed clock the bring-up ends after the scan
   ClockSetupConfig clocks;
   ConfiguratorConfig process;
   std::uint32_t retries = 5;  ///< of one frame during the bring-up

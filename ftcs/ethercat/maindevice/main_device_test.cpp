@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/ethercat/maindevice/csp_axis.h"
-#include "ftcs/ethercat/test/main_bench.h"
 #include "test/support/forbid_allocation.h"
+#include "test/support/main_bench.h"
 
 namespace ftcs::ethercat {
 namespace {

@@ -74,6 +74,8 @@ struct Network {
   std::array<SubDeviceInfo, kMaxSubDevices> devices{};
   std::size_t count = 0;
   std::size_t reference = kNoReference;  ///< the first with a distributed clock
+  static constexpr std::size_t kNoBridge = kMaxSubDevices;
+  std::size_t bridge = kNoBridge;  ///< the bridge terminal that tells plant time
 
   [[nodiscard]] std::span<SubDeviceInfo> all() noexcept { return {devices.data(), count}; }
   [[nodiscard]] std::span<const SubDeviceInfo> all() const noexcept {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/test/main_bench.h"
+#include "test/support/main_bench.h"
 
 namespace ftcs::ethercat {
 namespace {

@@ -43,9 +43,9 @@ inline constexpr std::size_t kMaximumMessageSize = 1472;
 [[nodiscard]] Result<Message, DecodeError> decode(std::span<const std::uint8_t> bytes) noexcept;
 
 /// An encoded message; Announce with a path trace of one and Follow_Up with its information, the
-/// longest ones, fit.
+/// longest ones, fit, and an AUTHENTICATION TLV behind them.
 struct MessageBytes {
-  std::array<std::uint8_t, 76> octets{};
+  std::array<std::uint8_t, 118> octets{};
   std::uint8_t size = 0;
   [[nodiscard]] constexpr std::span<const std::uint8_t> view() const noexcept {
     return {octets.data(), size};

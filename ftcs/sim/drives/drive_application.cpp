@@ -118,6 +118,8 @@ void DriveApplication::begin_op(Duration now) noexcept {
   }
   op_requested_ = true;
   publish_state();
+  // Who takes no outputs has none to wait for.
+  if (!synchronous_ && objects_.mapped_bytes(obj::kReceiveAssign) == 0) enter(AlState::kOp);
 }
 
 AlStatusCode DriveApplication::check_mailbox() const noexcept {
@@ -258,6 +260,19 @@ void DriveApplication::publish_inputs() noexcept {
   objects_.read_mapped(memory_.window(memory_.sync_manager(kInputs)));
 }
 
+void DriveApplication::show_stamps(std::uint64_t internal,
+                                   std::optional<std::uint64_t> external) noexcept {
+  constexpr std::uint32_t kPrimaryIsMaster = 2;
+  objects_.set(obj::kOtherSideMissing, external ? 0 : 1);
+  objects_.set(obj::kSyncMode, external ? kPrimaryIsMaster : 0);
+  if (external) {
+    objects_.set(obj::kStampsUpdated, objects_.get(obj::kStampsUpdated) ^ 1U);
+    objects_.set(obj::kInternalStamp, internal);
+    objects_.set(obj::kExternalStamp, *external);
+  }
+  publish_inputs();
+}
+
 Duration DriveApplication::watchdog_time() const noexcept {
   constexpr std::int64_t kTick = 40;  // ns, 25 MHz
   const std::int64_t divider = memory_.get<std::uint16_t>(reg::kWatchdogDivider) + 2;
@@ -275,7 +290,8 @@ void DriveApplication::tick(Duration now) noexcept {
     }
   }
   const Duration limit = watchdog_time();
-  const bool watched = memory_.sync_manager(kOutputs).watchdog() && limit > Duration{};
+  const SyncManagerChannel outputs = memory_.sync_manager(kOutputs);
+  const bool watched = outputs.active && outputs.watchdog() && limit > Duration{};
   const bool expired = watched && now - outputs_crystal_ > limit;
   if (expired && state_ == AlState::kOp) {
     const auto count = memory_.get<std::uint8_t>(reg::kWatchdogCounter);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "ftcs/ethercat/wire/al_state.h"
@@ -48,8 +49,9 @@ struct DriveFault {
 ///   0x001B                    no outputs for the time of the watchdog
 class DriveApplication {
  public:
-  DriveApplication(EscMemory& memory, const Identity& identity) noexcept
-      : memory_(memory), objects_(identity) {}
+  DriveApplication(EscMemory& memory, const Identity& identity,
+                   DeviceKind kind = DeviceKind::kDrive) noexcept
+      : memory_(memory), objects_(identity, kind) {}
 
   void power_on(Duration now) noexcept;
   /// AL control was written.
@@ -59,6 +61,9 @@ class DriveApplication {
   void on_sync0(const Sync0Event& event) noexcept;
   /// Watchdog and transitions that wait; `now` is the crystal.
   void tick(Duration now) noexcept;
+  /// Of a bridge terminal: what the clocks of both sides showed at one instant; none: the other
+  /// side is not connected.
+  void show_stamps(std::uint64_t internal, std::optional<std::uint64_t> external) noexcept;
   /// Answers a request in mailbox 0 if mailbox 1 is free.
   void serve_mailbox() noexcept;
 

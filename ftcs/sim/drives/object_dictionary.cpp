@@ -6,21 +6,21 @@
 
 namespace ftcs::ethercat {
 
-namespace {
-
 enum class Access : std::uint8_t {
   kRead,
   kWrite,
   kConfigure
 };  // kConfigure: written in PREOP only
 
-struct Entry {
+struct ObjectEntry {
   std::uint16_t index;
   std::uint8_t subindex;
   std::uint8_t size;  ///< bytes; 0: a string
   Access access;
   std::uint32_t reset_value;
 };
+
+namespace {
 
 using enum Access;
 constexpr std::uint32_t map_entry(ObjectAddress object, unsigned bits) {
@@ -32,7 +32,7 @@ constexpr std::uint32_t kSupportedSync = 0x0005;
 /// 250 us: the fastest cycle that the modelled drive takes.
 constexpr std::uint32_t kMinCycle = 250000;
 
-constexpr Entry kEntries[] = {
+constexpr ObjectEntry kDriveEntries[] = {
     {0x1000, 0, 4, kRead, 0x00020192},  // CiA 402, servo drive
     {0x1001, 0, 1, kRead, 0},
     {0x1008, 0, 0, kRead, 0},
@@ -123,34 +123,62 @@ constexpr Entry kEntries[] = {
     {0x60FF, 0, 4, kWrite, 0},
     {0x6502, 0, 4, kRead, 0x80},  // cyclic synchronous position
 };
-constexpr std::size_t kCount = sizeof(kEntries) / sizeof(kEntries[0]);
-static_assert(kCount <= ObjectDictionary::kCapacity);
-constexpr std::size_t kNotFound = kCount;
+
+constexpr ObjectEntry kBridgeEntries[] = {
+    {0x1000, 0, 4, kRead, 0x00001389},  // ETG.5001, modular device
+    {0x1008, 0, 0, kRead, 0},
+    {0x1009, 0, 0, kRead, 0},
+    {0x100A, 0, 0, kRead, 0},
+    {0x1018, 0, 1, kRead, 4},
+    {0x1018, 1, 4, kRead, 0},
+    {0x1018, 2, 4, kRead, 0},
+    {0x1018, 3, 4, kRead, 0},
+    {0x1018, 4, 4, kRead, 0},
+    {0x10F4, 0x00, 1, kRead, 0x13},
+    {0x10F4, 0x01, 1, kRead, 0},
+    {0x10F4, 0x0E, 1, kRead, 0},
+    {0x10F4, 0x0F, 1, kRead, 0},
+    {0x10F4, 0x10, 1, kRead, 1},
+    {0x10F4, 0x11, 8, kRead, 0},
+    {0x10F4, 0x12, 8, kRead, 0},
+    {0x10F4, 0x13, 4, kRead, 0},
+    {0x1A02, 0, 1, kRead, 9},
+    {0x1A02, 1, 4, kRead, map_entry(obj::kSyncMode, 2)},
+    {0x1A02, 2, 4, kRead, 6},
+    {0x1A02, 3, 4, kRead, 5},
+    {0x1A02, 4, 4, kRead, map_entry({0x10F4, 0x0E}, 1)},
+    {0x1A02, 5, 4, kRead, map_entry(obj::kStampsUpdated, 1)},
+    {0x1A02, 6, 4, kRead, map_entry(obj::kOtherSideMissing, 1)},
+    {0x1A02, 7, 4, kRead, map_entry(obj::kInternalStamp, 64)},
+    {0x1A02, 8, 4, kRead, map_entry(obj::kExternalStamp, 64)},
+    {0x1A02, 9, 4, kRead, map_entry({0x10F4, 0x13}, 32)},
+    {0x1C00, 0, 1, kRead, 4},
+    {0x1C00, 1, 1, kRead, 1},
+    {0x1C00, 2, 1, kRead, 2},
+    {0x1C00, 3, 1, kRead, 3},
+    {0x1C00, 4, 1, kRead, 4},
+    {0x1C12, 0, 1, kConfigure, 0},
+    {0x1C13, 0, 1, kConfigure, 0},
+    {0x1C13, 1, 2, kConfigure, obj::kStampMap},
+};
+static_assert(std::size(kDriveEntries) <= ObjectDictionary::kCapacity);
+static_assert(std::size(kBridgeEntries) <= ObjectDictionary::kCapacity);
+constexpr std::size_t kNotFound = ObjectDictionary::kCapacity;
 
 constexpr std::size_t kMaxAssigned = 1;
-constexpr std::uint32_t kMaxMapped = 8;
+constexpr std::uint32_t kMaxMapped = 8;  ///< that may be written
+constexpr std::size_t kMostMapped = 9;   ///< that any map has
 
-std::size_t find(ObjectAddress object) noexcept {
-  for (std::size_t i = 0; i < kCount; ++i) {
-    if (kEntries[i].index == object.index && kEntries[i].subindex == object.subindex) return i;
-  }
-  return kNotFound;
-}
-
-bool has_index(std::uint16_t index) noexcept {
-  return std::any_of(std::begin(kEntries), std::end(kEntries),
-                     [index](const Entry& entry) { return entry.index == index; });
-}
-
-const char* text(std::uint16_t index) noexcept {
-  if (index == obj::kDeviceName) return "FTCS modelled servo drive";
-  return "1.0";
+const char* text(std::uint16_t index, bool drive) noexcept {
+  if (index != obj::kDeviceName) return "1.0";
+  return drive ? "FTCS modelled servo drive" : "FTCS modelled bridge terminal";
 }
 
 ObjectAddress address_in(std::uint32_t mapped) noexcept {
   return {static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)};
 }
-std::size_t bytes_in(std::uint32_t mapped) noexcept { return (mapped & 0xFFU) / 8; }
+std::size_t bits_in(std::uint32_t mapped) noexcept { return mapped & 0xFFU; }
+std::size_t bytes_in(std::uint32_t mapped) noexcept { return bits_in(mapped) / 8; }
 /// Index 0 pads: nothing is behind it. Here in whole bytes.
 bool is_gap(std::uint32_t mapped) noexcept {
   return address_in(mapped).index == 0 && (mapped & 0xFFU) > 0 && (mapped & 7U) == 0;
@@ -158,12 +186,27 @@ bool is_gap(std::uint32_t mapped) noexcept {
 
 }  // namespace
 
-ObjectDictionary::ObjectDictionary(const Identity& identity) noexcept : identity_(identity) {
+ObjectDictionary::ObjectDictionary(const Identity& identity, DeviceKind kind) noexcept
+    : identity_(identity),
+      entries_(kind == DeviceKind::kDrive ? std::span<const ObjectEntry>{kDriveEntries}
+                                          : std::span<const ObjectEntry>{kBridgeEntries}) {
   reset();
 }
 
+std::size_t ObjectDictionary::find(ObjectAddress object) const noexcept {
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (entries_[i].index == object.index && entries_[i].subindex == object.subindex) return i;
+  }
+  return kNotFound;
+}
+
+bool ObjectDictionary::has_index(std::uint16_t index) const noexcept {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [index](const ObjectEntry& entry) { return entry.index == index; });
+}
+
 void ObjectDictionary::reset() noexcept {
-  for (std::size_t i = 0; i < kCount; ++i) values_[i] = kEntries[i].reset_value;
+  for (std::size_t i = 0; i < entries_.size(); ++i) values_[i] = entries_[i].reset_value;
   set({obj::kIdentity, 1}, identity_.vendor);
   set({obj::kIdentity, 2}, identity_.product);
   set({obj::kIdentity, 3}, identity_.revision);
@@ -172,10 +215,10 @@ void ObjectDictionary::reset() noexcept {
 
 std::uint32_t ObjectDictionary::get(ObjectAddress object) const noexcept {
   const std::size_t at = find(object);
-  return at == kNotFound ? 0 : values_[at];
+  return at == kNotFound ? 0 : static_cast<std::uint32_t>(values_[at]);
 }
 
-void ObjectDictionary::set(ObjectAddress object, std::uint32_t value) noexcept {
+void ObjectDictionary::set(ObjectAddress object, std::uint64_t value) noexcept {
   const std::size_t at = find(object);
   if (at != kNotFound) values_[at] = value;
 }
@@ -186,7 +229,7 @@ SdoAbort ObjectDictionary::check_mapping(std::uint16_t map, std::uint32_t count)
     const std::uint32_t mapped = get({map, static_cast<std::uint8_t>(n)});
     if (is_gap(mapped)) continue;
     const std::size_t at = find(address_in(mapped));
-    if (at == kNotFound || kEntries[at].size != bytes_in(mapped)) return SdoAbort::kCannotBeMapped;
+    if (at == kNotFound || entries_[at].size != bytes_in(mapped)) return SdoAbort::kCannotBeMapped;
   }
   return SdoAbort::kNone;
 }
@@ -196,15 +239,15 @@ SdoAbort ObjectDictionary::download(ObjectAddress object, ConstBytes data, bool 
   if (at == kNotFound) {
     return has_index(object.index) ? SdoAbort::kNoSuchSubindex : SdoAbort::kNoSuchObject;
   }
-  const Entry& entry = kEntries[at];
+  const ObjectEntry& entry = entries_[at];
   if (entry.access == kRead) return SdoAbort::kReadOnly;
   if (entry.access == kConfigure && !preop) return SdoAbort::kWrongState;
   if (data.size() != entry.size) return SdoAbort::kLengthMismatch;
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < data.size(); ++i) value |= std::uint32_t{data[i]} << (8 * i);
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < data.size(); ++i) value |= std::uint64_t{data[i]} << (8 * i);
   const bool map = object.index == obj::kReceiveMap || object.index == obj::kTransmitMap;
   if (map && object.subindex == 0) {
-    const SdoAbort abort = check_mapping(object.index, value);
+    const SdoAbort abort = check_mapping(object.index, static_cast<std::uint32_t>(value));
     if (abort != SdoAbort::kNone) return abort;
   }
   const bool assignment =
@@ -213,11 +256,16 @@ SdoAbort ObjectDictionary::download(ObjectAddress object, ConstBytes data, bool 
     return SdoAbort::kMappingTooLong;
   }
   if (assignment && object.subindex == 1) {
-    const auto only = object.index == obj::kReceiveAssign ? obj::kReceiveMap : obj::kTransmitMap;
-    if (value != only) return SdoAbort::kValueOutOfRange;
+    if (!can_be_assigned(object.index, value)) return SdoAbort::kValueOutOfRange;
   }
   values_[at] = value;
   return SdoAbort::kNone;
+}
+
+/// There is one map of each direction.
+bool ObjectDictionary::can_be_assigned(std::uint16_t assignment, std::uint64_t map) const noexcept {
+  if (assignment == obj::kReceiveAssign) return map == obj::kReceiveMap;
+  return has_index(obj::kStampMap) ? map == obj::kStampMap : map == obj::kTransmitMap;
 }
 
 ObjectDictionary::Upload ObjectDictionary::upload(ObjectAddress object) const noexcept {
@@ -227,9 +275,9 @@ ObjectDictionary::Upload ObjectDictionary::upload(ObjectAddress object) const no
     result.abort = has_index(object.index) ? SdoAbort::kNoSuchSubindex : SdoAbort::kNoSuchObject;
     return result;
   }
-  const Entry& entry = kEntries[at];
+  const ObjectEntry& entry = entries_[at];
   if (entry.size == 0) {
-    const char* string = text(entry.index);
+    const char* string = text(entry.index, !has_index(obj::kStampMap));
     result.size = std::min(std::strlen(string), result.bytes.size());
     std::memcpy(result.bytes.data(), string, result.size);
     return result;
@@ -247,9 +295,9 @@ std::uint32_t ObjectDictionary::mapping(std::uint16_t assignment, std::size_t n)
 }
 
 std::size_t ObjectDictionary::mapped_bytes(std::uint16_t assignment) const noexcept {
-  std::size_t sum = 0;
-  for (std::size_t n = 0; n < kMaxMapped; ++n) sum += bytes_in(mapping(assignment, n));
-  return sum;
+  std::size_t bits = 0;
+  for (std::size_t n = 0; n < kMostMapped; ++n) bits += bits_in(mapping(assignment, n));
+  return (bits + 7) / 8;
 }
 
 void ObjectDictionary::write_mapped(ConstBytes outputs) noexcept {
@@ -266,16 +314,23 @@ void ObjectDictionary::write_mapped(ConstBytes outputs) noexcept {
 }
 
 void ObjectDictionary::read_mapped(Bytes inputs) const noexcept {
-  std::size_t at = 0;
-  for (std::size_t n = 0; n < kMaxMapped; ++n) {
+  std::size_t at = 0;  // bits
+  for (std::size_t n = 0; n < kMostMapped; ++n) {
     const std::uint32_t mapped = mapping(obj::kTransmitAssign, n);
-    const std::size_t size = bytes_in(mapped);
-    if (at + size > inputs.size()) return;
-    const std::uint32_t value = get(address_in(mapped));
-    for (std::size_t i = 0; i < size; ++i) {
-      inputs[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
+    const std::size_t bits = bits_in(mapped);
+    if (at + bits > inputs.size() * 8) return;
+    const std::size_t entry = find(address_in(mapped));
+    const std::uint64_t value = entry == kNotFound ? 0 : values_[entry];
+    for (std::size_t i = 0; i < bits;) {
+      const std::size_t shift = (at + i) % 8;
+      const std::size_t part = std::min(8 - shift, bits - i);
+      const unsigned mask = ((1U << part) - 1U) << shift;
+      std::uint8_t& byte = inputs[(at + i) / 8];
+      const auto here = static_cast<unsigned>(value >> i) << shift;
+      byte = static_cast<std::uint8_t>((byte & ~mask) | (here & mask));
+      i += part;
     }
-    at += size;
+    at += bits;
   }
 }
 

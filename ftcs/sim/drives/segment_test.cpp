@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/test/wire_bench.h"
+#include "test/support/wire_bench.h"
 
 namespace ftcs::ethercat {
 namespace {

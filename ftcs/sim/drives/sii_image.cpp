@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <initializer_list>
 #include <span>
 
 namespace ftcs::ethercat {
@@ -113,17 +114,19 @@ void put_general(Appender& out) noexcept {
   out.finish();
 }
 
-void put_sync_managers(Appender& out) noexcept {
+void put_sync_managers(Appender& out, std::uint16_t outputs, std::uint16_t inputs) noexcept {
   struct Manager {
     std::uint16_t start;
     std::uint16_t length;
     std::uint8_t control;
     std::uint8_t type;
   };
-  constexpr Manager kManagers[] = {
-      {0x1000, 128, 0x26, 1}, {0x1080, 128, 0x22, 2}, {0x1100, 7, 0x64, 3}, {0x1400, 7, 0x20, 4}};
+  const Manager managers[] = {{0x1000, 128, 0x26, 1},
+                              {0x1080, 128, 0x22, 2},
+                              {0x1100, outputs, 0x64, 3},
+                              {0x1400, inputs, 0x20, 4}};
   out.begin(sii::kSyncManagers);
-  for (const Manager& manager : kManagers) {
+  for (const Manager& manager : managers) {
     out.put(manager.start);
     out.put(manager.length);
     out.put(manager.control);
@@ -134,25 +137,46 @@ void put_sync_managers(Appender& out) noexcept {
   out.finish();
 }
 
+void put_strings(Appender& out, std::initializer_list<const char*> strings) noexcept {
+  out.begin(sii::kStrings);
+  out.put(static_cast<std::uint8_t>(strings.size()));
+  for (const char* string : strings) out.put_string(string);
+  out.finish();
+}
+
+void put_fmmus(Appender& out) noexcept {
+  out.begin(sii::kFmmus);
+  for (const std::uint8_t use : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}}) out.put(use);
+  out.finish();
+}
+
 }  // namespace
+
+SiiImage make_bridge_image(const Identity& identity, std::uint16_t alias) noexcept {
+  SiiImage image;
+  image.fill(0xFF);
+  put_fixed_part(image, identity, alias);
+  Appender out(image);
+  put_strings(out, {"FTCS-BRIDGE", "FTCS modelled bridge terminal", "DC", "time stamps"});
+  put_general(out);
+  put_fmmus(out);
+  put_sync_managers(out, 0, 22);
+  constexpr std::uint32_t kStamps[] = {0x10F40102, 0x00000006, 0x00000005, 0x10F40E01, 0x10F40F01,
+                                       0x10F41001, 0x10F41140, 0x10F41240, 0x10F41320};
+  put_pdo(out, sii::kTxPdo, obj::kStampMap, 3, kStamps);
+  out.put(sii::kEnd);
+  return image;
+}
 
 SiiImage make_drive_image(const Identity& identity, std::uint16_t alias, bool with_dc) noexcept {
   SiiImage image;
   image.fill(0xFF);
   put_fixed_part(image, identity, alias);
   Appender out(image);
-  out.begin(sii::kStrings);
-  out.put(std::uint8_t{4});
-  out.put_string("FTCS-DRIVE");
-  out.put_string("FTCS modelled servo drive");
-  out.put_string("DC");
-  out.put_string("CSP");
-  out.finish();
+  put_strings(out, {"FTCS-DRIVE", "FTCS modelled servo drive", "DC", "CSP"});
   put_general(out);
-  out.begin(sii::kFmmus);
-  for (const std::uint8_t use : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}}) out.put(use);
-  out.finish();
-  put_sync_managers(out);
+  put_fmmus(out);
+  put_sync_managers(out, 7, 7);
   constexpr std::uint32_t kInputs[] = {0x60410010, 0x60640020, 0x60610008};
   constexpr std::uint32_t kOutputs[] = {0x60400010, 0x607A0020, 0x60600008};
   put_pdo(out, sii::kTxPdo, 0x1A00, 3, kInputs);

@@ -21,8 +21,11 @@ SubDevice::SubDevice(const SubDeviceConfig& config, LocalOscillator& oscillator)
     : config_(config),
       oscillator_(oscillator),
       dc_(memory_, oscillator, config.clock),
-      sii_(memory_, make_drive_image(config.identity, config.alias, config.dc)),
-      drive_(memory_, config.identity) {
+      sii_(memory_, config.other_side != nullptr
+                        ? make_bridge_image(config.identity, config.alias)
+                        : make_drive_image(config.identity, config.alias, config.dc)),
+      drive_(memory_, config.identity,
+             config.other_side != nullptr ? DeviceKind::kBridge : DeviceKind::kDrive) {
   power_cycle(WireTime{});
 }
 
@@ -33,7 +36,8 @@ void SubDevice::power_cycle(WireTime now) noexcept {
   memory_.set(reg::kSyncManagerCount, static_cast<std::uint8_t>(EscMemory::kSyncManagers));
   memory_.set(reg::kRamSize, static_cast<std::uint8_t>(EscMemory::kRamKiByte));
   memory_.set(reg::kPortDescriptor, kAllPortsMii);
-  const unsigned features = config_.dc ? reg::kFeatureDc | reg::kFeatureDc64 : 0;
+  const unsigned features =
+      config_.dc ? reg::kFeatureDc | (config_.dc64 ? reg::kFeatureDc64 : 0U) : 0U;
   memory_.set(reg::kFeatures, static_cast<std::uint16_t>(features));
   memory_.set(reg::kPdiControl, std::uint8_t{0x05});
   memory_.set(reg::kWatchdogDivider, std::uint16_t{0x09C2});
@@ -61,7 +65,18 @@ void SubDevice::advance(WireTime now) noexcept {
     drive_.on_sync0(event);
     if (i >= kMaxSync0PerFrame) dc_.skip_sync0(now);
   }
+  if (config_.other_side != nullptr) latch_both_sides(now);
   drive_.tick(oscillator_.reading(now));
+}
+
+/// A bridge terminal has a pace of its own: each millisecond, wherever the frames are.
+void SubDevice::latch_both_sides(WireTime now) noexcept {
+  constexpr std::int64_t kPace_ns = 1'000'000;
+  const std::int64_t number = now.since_epoch().floor_ns() / kPace_ns;
+  if (number == latches_) return;
+  latches_ = number;
+  const auto instant = WireTime::from_ns(number * kPace_ns);
+  drive_.show_stamps(dc_.system_time(instant), config_.other_side->system_time(instant));
 }
 
 void SubDevice::process(const FrameView& frame, WireTime sof) noexcept {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "ftcs/ethercat/wire/frame.h"
 #include "ftcs/sim/drives/dc_unit.h"
@@ -13,13 +14,31 @@
 
 namespace ftcs::ethercat {
 
+/// The other side of a bridge terminal: the distributed clock of the segment there.
+class OtherSide {
+ public:
+  /// None: it is not connected.
+  [[nodiscard]] virtual std::optional<std::uint64_t> system_time(WireTime instant) noexcept = 0;
+
+ protected:
+  OtherSide() = default;
+  OtherSide(const OtherSide&) = default;
+  OtherSide& operator=(const OtherSide&) = default;
+  ~OtherSide() = default;
+};
+
 struct SubDeviceConfig {
   /// 0xF7C5 is no vendor number of the EtherCAT Technology Group.
   Identity identity{0x0000F7C5, 0x00000402, 0x00010000, 0};
   std::uint16_t alias = 0;
   bool dc = true;
+  bool dc64 = true;  ///< system time of 64 bits, else 32
   DcUnitConfig clock;
+  /// Not null: this is a bridge terminal, and no drive; must outlive the SubDevice.
+  OtherSide* other_side = nullptr;
 };
+/// As the modelled bridge terminal calls itself.
+inline constexpr Identity kBridgeIdentity{0x0000F7C5, 0x00006695, 0x00010002, 0};
 
 /// One SubDevice: the controller (ESC) with its memory, datagram rules and distributed clock, and a
 /// CiA 402 drive behind it. All times are the start of frame at its port 0. No heap, no I/O; the
@@ -62,6 +81,7 @@ class SubDevice {
   void after_write(std::size_t address, ConstBytes in, WireTime sof) noexcept;
   void after_dc_write(std::size_t address, ConstBytes in, WireTime sof) noexcept;
   void decode_channels() noexcept;
+  void latch_both_sides(WireTime now) noexcept;
   [[nodiscard]] bool mailbox_blocks(std::size_t address, std::size_t size,
                                     bool write) const noexcept;
   [[nodiscard]] bool map(const FmmuChannel& channel, const Datagram& datagram, bool write,
@@ -78,7 +98,8 @@ class SubDevice {
   std::array<FmmuChannel, EscMemory::kFmmus> fmmus_{};
   std::array<SyncManagerChannel, EscMemory::kSyncManagers> sync_managers_{};
   DlStatus links_;
-  bool latching_ = false;  ///< the frame under way wrote 0x0900
+  std::int64_t latches_ = 0;  ///< of a bridge terminal: number of the last one
+  bool latching_ = false;     ///< the frame under way wrote 0x0900
 };
 
 }  // namespace ftcs::ethercat

@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/test/wire_bench.h"
 #include "ftcs/ethercat/wire/sii.h"
 #include "test/support/forbid_allocation.h"
+#include "test/support/wire_bench.h"
 
 namespace ftcs::ethercat {
 namespace {

@@ -2,6 +2,8 @@
 // What a job inside the virtual machine needs to know of its clocks; see usage() for its commands.
 // Runs in the guest alone.
 #include <algorithm>
+#include <arpa/inet.h>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -10,13 +12,17 @@
 #include <ctime>
 #include <fstream>
 #include <iostream>
+#include <linux/if_packet.h>
 #include <linux/ptp_clock.h>
 #include <map>
+#include <net/ethernet.h>
+#include <net/if.h>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <sys/socket.h>
 #include <sys/timex.h>
 #include <unistd.h>
 #include <vector>
@@ -32,6 +38,9 @@ constexpr auto kTruth = "/sys/kernel/debug/vptp/truth";
   witness annotate                      each line of standard input, behind the truth at its arrival
   witness busy SECONDS                  keeps a processor busy
   witness system [reset]                what the kernel says of CLOCK_REALTIME; its own rate, not synchronised, no leap second
+  witness forge DEVICE OFFSET FLAGS COUNT
+      COUNT Announces behind the next one that DEVICE sends, as if from the same port, with this UTC offset (s) and the second octet of the flags
+      (hexadecimal: 1 leap61, 2 leap59, 4 the offset is valid, 8 PTP timescale), 50 ms apart
   witness judge FILE A-B [limit=V ...]  A minus B in a file of the truth, ns. A, B: real, phc0, phc1, ...
       target=NS  what A - B should be (0)      band=NS   of the lock (100)
       lock=S     within the band from so many seconds on, or never: failed
@@ -110,6 +119,61 @@ int system_clock(const Arguments& arguments) {
       (t.status & STA_INS) != 0   ? "insert"
       : (t.status & STA_DEL) != 0 ? "delete"
                                   : "none");
+  return 0;
+}
+
+// IEEE 1588-2019, 13.5 and tables 36, 37, 43, behind the Ethernet header.
+namespace announce {
+constexpr std::size_t kType = 14, kFlags = 14 + 7, kSequence = 14 + 30, kUtcOffset = 14 + 44;
+constexpr std::size_t kLength = 14 + 64;
+constexpr unsigned kAnnounce = 0xB;
+}  // namespace announce
+
+int open_packets(const char* device) {
+  const int packets = socket(AF_PACKET, SOCK_RAW, htons(ETH_P_ALL));  // what is sent is seen too
+  sockaddr_ll address{};
+  address.sll_family = AF_PACKET;
+  address.sll_protocol = htons(ETH_P_ALL);
+  address.sll_ifindex = static_cast<int>(if_nametoindex(device));
+  if (packets < 0 || address.sll_ifindex == 0 ||
+      bind(packets, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::runtime_error(std::string("cannot listen on ") + device);
+  }
+  return packets;
+}
+
+using Frame = std::array<std::uint8_t, announce::kLength>;
+
+Frame next_announce(int packets) {
+  Frame frame{};
+  for (;;) {
+    const auto length = recv(packets, frame.data(), frame.size(), MSG_TRUNC);
+    if (length < 0) throw std::runtime_error("cannot receive");
+    const bool ptp = frame[12] == 0x88 && frame[13] == 0xF7;
+    if (ptp && length >= static_cast<ssize_t>(frame.size()) &&
+        (frame[announce::kType] & 0xFU) == announce::kAnnounce) {
+      return frame;
+    }
+  }
+}
+
+void put_u16(Frame& frame, std::size_t at, unsigned value) {
+  frame[at] = static_cast<std::uint8_t>(value >> 8U);
+  frame[at + 1] = static_cast<std::uint8_t>(value);
+}
+
+int forge(const Arguments& arguments) {
+  if (arguments.size() != 4) usage();
+  const int packets = open_packets(arguments[0].c_str());
+  Frame frame = next_announce(packets);
+  const unsigned sequence = frame[announce::kSequence] * 256U + frame[announce::kSequence + 1];
+  put_u16(frame, announce::kUtcOffset, static_cast<unsigned>(std::stoi(arguments[1])));
+  frame[announce::kFlags] = static_cast<std::uint8_t>(std::stoul(arguments[2], nullptr, 16));
+  for (unsigned i = 1; i <= std::stoul(arguments[3]); ++i) {
+    put_u16(frame, announce::kSequence, sequence + i);
+    if (send(packets, frame.data(), frame.size(), 0) < 0) throw std::runtime_error("cannot send");
+    usleep(50'000);
+  }
   return 0;
 }
 
@@ -276,6 +340,7 @@ int run(const std::string& command, const Arguments& arguments) {
   if (command == "annotate") return annotate();
   if (command == "busy") return busy(arguments);
   if (command == "system") return system_clock(arguments);
+  if (command == "forge") return forge(arguments);
   if (command == "judge") return judge(arguments);
   if (command == "sigma") return sigma(arguments);
   usage();

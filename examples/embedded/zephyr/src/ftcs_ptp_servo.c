@@ -42,6 +42,11 @@ static int set_addend(uint32_t addend) {
   return ptp_clock_rate_adjust(device, ftcs_rate_ratio(addend, NOMINAL));
 }
 
+/* The kernel's time, to a microsecond, in which the clock at `addend` goes on by `clock_ns`. */
+static int64_t kernel_ns(int64_t clock_ns, uint32_t addend) {
+  return clock_ns / 1024 * NOMINAL / addend * 1024;
+}
+
 /* A kernel timer is late by up to a tick, and says how much. */
 static void correction_over(struct k_work* work) {
   (void)work;
@@ -82,7 +87,8 @@ int ftcs_ptp_servo_sync(int64_t origin_ns, int64_t receive_ns, int64_t path_dela
     error = set_addend(command.addend);
     ftcs_addend_wrote(&servo, now_ns(), command.addend, command.next_addend);
     next_addend = command.next_addend;
-    (void)k_work_schedule(&end_of_correction, K_NSEC(command.until_ns - now_ns()));
+    (void)k_work_schedule(&end_of_correction,
+                          K_NSEC(kernel_ns(command.until_ns - now_ns(), command.addend)));
   }
   (void)k_mutex_unlock(&lock);
   return error < 0 ? error : command.state;

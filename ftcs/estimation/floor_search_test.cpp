@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// World: two messages forward and one back in each cycle (a Sync and the two peer delay messages
+// where the neighbour is the transmitter), noise normal of 100 ns; the clock is 1 ppm slower from
+// one moment on.
+#include "ftcs/estimation/floor_search.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace ftcs::estimation {
+namespace {
+
+/// Whether a floor is found before or after the step of the rate.
+bool finds_a_floor(std::uint64_t seed, double changed_at) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0.0, 100.0);
+  FloorSearch search;
+  double time = 0.0;
+  for (std::size_t k = 0; k < 360; ++k) {
+    const Direction direction = k % 3 == 1 ? Direction::kBackward : Direction::kForward;
+    time += 1.0 / 3.0;
+    const double x = 5e4 * time - 1000.0 * std::max(0.0, time - changed_at);
+    const double z = x + sign_of(direction) * (10e3 + normal(random));
+    search.hear({direction, z, 0.0, false, time < changed_at ? 5e4 : 4.9e4}, 1.0 / 3.0);
+    if (search.look({}, 0.4)) return true;
+  }
+  return false;
+}
+
+// With windows of as many messages of either direction, twice as long back as forward: 40 of 40.
+TEST(FloorSearch, a_rate_that_has_changed_is_no_floor_where_one_direction_speaks_twice_as_often) {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) found += finds_a_floor(seed, 20.0) ? 1 : 0;
+  EXPECT_EQ(found, 0);
+}
+
+}  // namespace
+}  // namespace ftcs::estimation

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "ftcs/fieldbus/run_options.h"
+#include "ftcs/platform/kernel.h"
+
+namespace ftcs::daemon {
+
+/// `ftcs ethercat scan`: what is on the wire, to the standard output. Returns an exit code; what
+/// went wrong stands on standard error.
+[[nodiscard]] int scan_ethercat(platform::Kernel& kernel, const RunOptions& options);
+/// `ftcs ethercat run`: plant time, drives, cycles, figures and files. Can the files of the options
+/// be written, is asked before.
+[[nodiscard]] int run_ethercat(platform::Kernel& kernel, const RunOptions& options);
+
+}  // namespace ftcs::daemon

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "ftcs/fieldbus/main_runner.h"
+#include "ftcs/report/json.h"
+
+namespace ftcs::daemon {
+
+[[nodiscard]] const char* name(CycleState state);
+[[nodiscard]] const char* name(node::BusMode mode);
+[[nodiscard]] const char* name(node::CycleNote::Kind kind);
+void print_scan(const ethercat::MainDevice& main);
+/// One or two lines for the user: what failed, where, and what was expected.
+[[nodiscard]] std::string describe(const ethercat::Failure& failure);
+void print_run(const MainRunner& runner);
+[[nodiscard]] Json run_json(const MainRunner& runner);
+
+}  // namespace ftcs::daemon

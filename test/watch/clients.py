@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""clients.py build/ftcs: a hundred web clients that are slow, silent or too many, at the page's address (IPv6). The clock stays locked, the
+metrics at an address of their own are not kept waiting, threads and memory stay, and the page answers again when they have gone."""
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+PORT = 21000 + os.getpid() % 4000 * 4
+CLIENTS = 100
+
+
+def get(url, timeout):
+    begin = time.monotonic()
+    with urllib.request.urlopen(url, timeout=timeout) as answer:
+        return answer.read().decode(), time.monotonic() - begin
+
+
+def status(pid, name):
+    with open(f"/proc/{pid}/status") as file:
+        return int(re.search(rf"^{name}:\s+(\d+)", file.read(), re.M).group(1))
+
+
+def state(ftcs, folder):
+    asked = subprocess.run([ftcs, "status", "--json", "-s", f"{folder}/uds"], capture_output=True, text=True)
+    return json.loads(asked.stdout or "{}")
+
+
+def until_locked(ftcs, folder):
+    for _ in range(100):
+        if state(ftcs, folder).get("locked"):
+            return
+        time.sleep(0.3)
+    raise AssertionError("never locked")
+
+
+def crowd():
+    """Half of a request and silence; an event stream that nobody reads; nothing at all."""
+    clients = []
+    for number in range(CLIENTS):
+        client = socket.create_connection(("::1", PORT + 2), timeout=5)
+        client.sendall((b"GET /sta", b"GET /events HTTP/1.1\r\nHost: [::1]\r\n\r\n", b"")[number % 3])
+        clients.append(client)
+    return clients
+
+
+def examine(ftcs, folder, receiver):
+    until_locked(ftcs, folder)
+    page, metrics = f"http://[::1]:{PORT + 2}/", f"http://127.0.0.1:{PORT + 3}/metrics"
+    get(page, 5)
+    threads, memory = status(receiver.pid, "Threads"), status(receiver.pid, "VmRSS")
+    clients = crowd()
+    slowest, used = 0.0, []
+    for _ in range(16):
+        text, seconds = get(metrics, 5)
+        slowest = max(slowest, seconds)
+        used.append(float(re.search(r"^ftcs_samples_used_total{.*} (\S+)$", text, re.M).group(1)))
+        time.sleep(0.25)
+    assert used[-1] - used[0] > 30, f"the loop was held up: {used}"  # sixteen Syncs a second, for four seconds
+    until_locked(ftcs, folder)
+    more, grown = status(receiver.pid, "Threads") - threads, status(receiver.pid, "VmRSS") - memory
+    assert more <= 1 and grown < 20_000, f"{more} threads, {grown} kB more"
+    assert slowest < 2, f"metrics took {slowest} s"
+    for client in clients:
+        client.close()
+    _, seconds = get(page, 30)
+    print(f"{CLIENTS} clients: locked, metrics within {slowest * 1e3:.0f} ms, {more} threads and {grown} kB more; page after {seconds:.1f} s")
+
+
+def main():
+    ftcs = os.path.realpath(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:
+        base = [ftcs, "ptp", "-i", "lo", "-S", "--event-port", str(PORT), "--general-port", str(PORT + 1), "--logAnnounceInterval", "-2"]
+        quiet = dict(stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        transmitter = subprocess.Popen([*base, "--role", "time-transmitter", "--uds_address", "none", "--logSyncInterval", "-4",
+                                        "--logMinDelayReqInterval", "-4"], **quiet)
+        receiver = subprocess.Popen([*base, "--never-step", "--uds_address", f"{folder}/uds", "--web", f"[::1]:{PORT + 2}", "--metrics",
+                                     str(PORT + 3)], **quiet)
+        try:
+            examine(ftcs, folder, receiver)
+        finally:
+            for process in (transmitter, receiver):
+                process.terminate()
+                process.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
