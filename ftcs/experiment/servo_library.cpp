@@ -86,9 +86,12 @@ void enter_script(const std::string& path, ftcs_servo_functions& functions) {
   // What the script made is kept: its callbacks must live as long as the program.
   int refused = 1;
   const std::string code = fmt::format(
-      "import ctypes, os, runpy, sys, traceback\n"
-      // Else Python drops what a callback raises, and the run would go on without a servo.
+      "import ctypes, os, runpy, sys, threading, traceback\n"
+      "ftcs_first = threading.Lock()\n"
+      // Else Python drops what a callback raises, and the run would go on without a servo. Seeds run
+      // in threads of their own: the first one that fails speaks and ends all, the others wait.
       "def ftcs_raised(what):\n"
+      "    ftcs_first.acquire()\n"
       "    traceback.print_exception(what.exc_type, what.exc_value, what.exc_traceback)\n"
       "    print(f'ftcs: --servo {{ftcs_path}}: raised in a callback; no result', "
       "file=sys.stderr)\n"
