@@ -18,6 +18,9 @@ void board_write(const char* text);
 void board_count_start(void);
 uint32_t board_count(void);
 
+/* Called as the Ethernet adapter asks for it, where a program has it. */
+void board_ethernet_interrupt(void) __attribute__((weak));
+
 /* A line of a test's output, put together without stdio. */
 void board_text(const char* text);
 void board_decimal(int64_t value);

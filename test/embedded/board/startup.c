@@ -51,9 +51,18 @@ void reset(void) {
   leave((uint32_t)main());
 }
 
-__attribute__((section(".vectors"), used)) static const void* const vectors[16] = {
-    &stack_top,         (const void*)reset, (const void*)fault, (const void*)fault,
-    (const void*)fault, (const void*)fault, (const void*)fault};
+static void nothing(void) {}
+
+__attribute__((section(".vectors"), used)) static const void* const vectors[16 + 14] = {
+    [0] = &stack_top,
+    [1] = (const void*)reset,
+    [2] = (const void*)fault,
+    [3] = (const void*)fault,
+    [4] = (const void*)fault,
+    [5] = (const void*)fault,
+    [6] = (const void*)fault,
+    [15] = (const void*)nothing, /* SysTick: it ends a WFI */
+    [16 + 13] = (const void*)board_ethernet_interrupt};
 
 /* With QEMU's -icount shift=8 an instruction takes 256 ns of the machine's time, and SysTick counts
  * its 25 MHz: 6.4 ticks an instruction. What counting nothing costs is subtracted. */
