@@ -41,6 +41,11 @@ class FixedRate {
 /// off is kept when the map is continued under another rate, so that a clock that is steered 10^9
 /// times has no drift of its own. Elapsed times are differences modulo 2^64 ns: a counter that
 /// wraps is harmless.
+///
+///     const AffineMap<FreeRunningTime, LocalTime> shown{f0, l0, Rate::from_ppm(50.0)};
+///     shown(f0 + Nanoseconds{1'000'000'000});   // l0 + 1'000'050'000 ns
+///
+/// Valid: images within ±292 years of to_base; beyond that they wrap.
 template <class From, class To>
 class AffineMap {
  public:

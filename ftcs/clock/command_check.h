@@ -15,15 +15,15 @@ namespace ftcs {
   return command.correction_time > Duration{};
 }
 
-/// How long the correction lasts on the free-running oscillator: T_c is reference time, and the
-/// tracking rate is reference per free running.
+/// How long the correction lasts on the free-running oscillator: correction_time / tracking_rate.
+/// T_c is reference time, and the tracking rate is reference per free running (paper Fig. 3).
 [[nodiscard]] inline Duration correction_length(const ServoCommand& command) noexcept {
   const AffineMap<FreeRunningTime, ReferenceTime> reference{{}, {}, command.tracking_rate};
   return reference.inverse(ReferenceTime{command.correction_time}).since_epoch();
 }
 
-/// Why a clock with these limits must refuse the command. A correction rate that will not be used
-/// may be anything finite.
+/// Why a clock with these limits must refuse the command; no value: it may take it. A correction
+/// rate that will not be used may be anything finite.
 [[nodiscard]] inline std::optional<ClockError> find_error(const ServoCommand& command,
                                                           const RateLimits& limits) noexcept {
   if (!std::isfinite(command.correction_rate.ratio()) ||

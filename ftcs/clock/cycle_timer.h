@@ -15,6 +15,7 @@ struct CycleTimerConfig {
       1};  ///< the timer can only fire at multiples of it on the unsteered clock; above 0
 };
 
+/// One trigger, on both clocks: |scheduled - virtual_instant| <= resolution / 2.
 struct CycleTrigger {
   LocalTime local;  ///< the cycle's nominal time on the steered clock
   FreeRunningTime
@@ -33,6 +34,10 @@ struct CycleTrigger {
 /// = cycle_time / a long on the unsteered clock (eq. 25 and 26 act on T_m); T_m is a real number,
 /// only the trigger is rounded and its rounding never enters the next one. The history belongs to a
 /// VirtualClock that takes the servo's commands.
+///
+///     for (;;) { sleep_until(timer.next(clock.history()).scheduled);  work();  timer.advance(); }
+///
+/// BasicCycleServo is this with a servo around it. Neither length of the configuration is checked.
 class CycleTimer {
  public:
   explicit CycleTimer(const CycleTimerConfig& config) noexcept
@@ -42,8 +47,8 @@ class CycleTimer {
   [[nodiscard]] CycleTrigger next(const SteeringHistory& history) const noexcept;
   /// The trigger fired: on to the next one.
   void advance() noexcept { next_ = next_ + config_.cycle_time; }
-  /// Moves to the first trigger after `now` and returns how many were passed over. Never moves
-  /// back.
+  /// Moves to the first trigger after `now` and returns how many were passed over; zero if the next
+  /// one is still to come. Never moves back.
   std::int64_t skip_missed(LocalTime now) noexcept;
 
  private:

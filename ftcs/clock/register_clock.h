@@ -11,12 +11,17 @@ namespace ftcs {
 
 /// The registers of a clock that stamps with what is steered: the time stamping unit of an Ethernet
 /// MAC. An implementation is a few lines (examples/embedded).
+///
+/// The unit adds the addend to an accumulator of 32 bits at each tick and moves its time on when
+/// that overflows (paper Fig. 2): rate = addend / nominal addend. No function may fail, and none
+/// may call back into the RegisterClock.
 class AddendRegister {
  public:
   /// What the clock shows.
   [[nodiscard]] virtual LocalTime now() noexcept = 0;
   /// The clock runs at addend / nominal addend from here on.
   virtual void write(std::uint32_t addend) noexcept = 0;
+  /// Adds to what the clock shows, in either direction: the coarse update of the unit.
   virtual void step(Duration by) noexcept = 0;
   /// RegisterClock::on_alarm() is to be called when the clock shows `at`; replaces an earlier one.
   virtual void alarm(LocalTime at) noexcept = 0;
@@ -41,9 +46,12 @@ struct RegisterClockConfig {
 /// with what the clock shows and runs at what nominal_addend would make. A correction is ended by
 /// on_alarm(), or by the first read() after it: lateness is accounted for. One thread; where
 /// on_alarm() is an interrupt, it is held off while another function runs.
+///
+/// A rate is rounded to the nearest addend, 1 / nominal_addend apart (0.23 ppb and more with 32
+/// bits); tell the adaptive servo by SteeringLimits::rate_granularity.
 class RegisterClock final : public AdjustableClock, public FreeRunningSource {
  public:
-  /// The registers must outlive the clock; both addends above zero.
+  /// The registers must outlive the clock; both addends above zero, unchecked.
   RegisterClock(AddendRegister& registers, const RegisterClockConfig& config) noexcept;
 
   [[nodiscard]] ClockReading read() noexcept override;
@@ -59,8 +67,10 @@ class RegisterClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] FreeRunningTime from_stamp(LocalTime stamp) const noexcept {
     return history_.free_running_at(stamp);
   }
-  /// The correction is over: the tracking addend is written. Too early or too late is no harm.
+  /// The correction is over: the tracking addend is written. Too late is accounted for; too early
+  /// does nothing, and the next read() or alarm ends the correction.
   void on_alarm() noexcept { static_cast<void>(read()); }
+  /// What the register holds at present.
   [[nodiscard]] std::uint32_t addend() const noexcept { return addend_; }
 
  private:

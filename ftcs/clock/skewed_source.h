@@ -19,6 +19,8 @@ class SkewedSource final : public FreeRunningSource {
       : underlying_(underlying), map_(start, start, rate) {}
 
   [[nodiscard]] FreeRunningTime now() noexcept override { return map_(underlying_.now()); }
+  /// What this source showed when the underlying one showed `instant`; to_underlying() is its
+  /// inverse, to 2^-32 ns.
   [[nodiscard]] FreeRunningTime from_underlying(FreeRunningTime instant) const noexcept {
     return map_(instant);
   }

@@ -16,7 +16,7 @@ namespace ftcs {
 ///
 /// Follow_Up, Delay_Resp and transmit stamps arrive after the next command may have been given;
 /// each stamp is converted by the segment in which it was taken. A step is a boundary between two
-/// segments and nothing else.
+/// segments and nothing else. A value of fixed size; a call searches at most kCapacity segments.
 class SteeringHistory {
  public:
   using Map = AffineMap<FreeRunningTime, LocalTime>;
@@ -44,6 +44,7 @@ class SteeringHistory {
   [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept {
     return segments_.at(instant).map(instant);
   }
+  /// Local per free running, in force from `instant` on.
   [[nodiscard]] Rate rate_at(FreeRunningTime instant) const noexcept {
     return segments_.at(instant).map.rate();
   }

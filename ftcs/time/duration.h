@@ -18,6 +18,12 @@ using Nanoseconds = std::chrono::nanoseconds;
 /// modulo 2^64 ns (a counter that wraps, or a hostile timestamp, is defined behaviour). The
 /// fraction is what correctionField (IEEE 1588-2019, 13.3.2.9, units of 2^-16 ns) and a
 /// rate-adjusted clock need: 1 ppb over 100 us is 1e-4 ns.
+///
+///     const Duration d = Nanoseconds{3} + Duration::from_ns(0.25);
+///     d.floor_ns() == 3;  d.ns() == 3.25;  (-d).floor_ns() == -4;
+///
+/// Comparison is of the values as they stand, not modulo 2^64 ns: of two readings of a counter that
+/// may wrap, compare the difference with Duration{}, which is right up to 146 years.
 class Duration {
  public:
   constexpr Duration() noexcept = default;
@@ -25,6 +31,7 @@ class Duration {
   constexpr Duration(Nanoseconds whole) noexcept
       : whole_(whole.count()) {}  // NOLINT(google-explicit-constructor)
 
+  /// whole_ns + fraction / 2^32 ns; every pair of values is valid.
   [[nodiscard]] static constexpr Duration from_parts(std::int64_t whole_ns,
                                                      std::uint32_t fraction) noexcept {
     Duration duration;
@@ -37,12 +44,15 @@ class Duration {
   }
   /// Nearest representable value; saturates at ±2^62 ns; not-a-number becomes zero.
   [[nodiscard]] static constexpr Duration from_ns(double ns) noexcept;
-  /// IEEE 1588-2019, 5.3.2 TimeInterval: units of 2^-16 ns.
+  /// IEEE 1588-2019, 5.3.2 TimeInterval: units of 2^-16 ns. Without loss; such a field spans ±1.6
+  /// days.
   [[nodiscard]] static constexpr Duration from_scaled_ns(std::int64_t scaled) noexcept {
     return from_parts(scaled >> 16, (static_cast<std::uint32_t>(scaled) & 0xFFFFU) << 16);
   }
 
+  /// Whole nanoseconds, rounded towards minus infinity: -0.5 ns is -1.
   [[nodiscard]] constexpr std::int64_t floor_ns() const noexcept { return whole_; }
+  /// What floor_ns() leaves, in 2^-32 ns; never negative.
   [[nodiscard]] constexpr std::uint32_t fraction() const noexcept { return fraction_; }
   /// Nearest whole nanosecond, halves upwards.
   [[nodiscard]] constexpr std::int64_t rounded_ns() const noexcept {
@@ -114,6 +124,7 @@ constexpr Duration Duration::from_ns(double ns) noexcept {
                     static_cast<std::uint32_t>(fraction));
 }
 
+/// Magnitude. That of -2^63 ns does not exist: it stays negative, as -value of it does.
 [[nodiscard]] constexpr Duration abs(Duration value) noexcept {
   return value < Duration{} ? -value : value;
 }

@@ -13,7 +13,9 @@ inline constexpr std::array<Direction, 2> kDirections = {Direction::kForward, Di
   return direction == Direction::kForward ? Direction::kBackward : Direction::kForward;
 }
 
-/// +1 forward, -1 backward: the path delay enters a reading with it.
+/// +1 forward, -1 backward: with it the path delay d enters what one message shows,
+/// free running - reference = x + sign d. A forward message is stamped late by d on the
+/// oscillator, a backward one on the reference.
 [[nodiscard]] constexpr double sign_of(Direction direction) noexcept {
   return direction == Direction::kForward ? 1.0 : -1.0;
 }

@@ -10,6 +10,10 @@ namespace ftcs {
 /// A value or the reason why there is none. No exceptions, no heap; as std::expected, which neither
 /// gcc 12 nor clang 14 has in C++20. Asking for the part that is not there is a programming error
 /// (undefined).
+///
+///     const Result<ClockReading, ClockError> applied = clock.apply(command);
+///     if (!applied) return applied.error();
+///     use(applied->free_running);
 template <class T, class E>
 class [[nodiscard]] Result {
   static_assert(!std::is_same_v<T, E>, "value and error must be different types");

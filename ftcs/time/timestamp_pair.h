@@ -13,7 +13,9 @@ enum class Direction : std::uint8_t {
 };
 
 /// One timestamped message as a protocol sees it: reference stamp and stamp of the free-running
-/// oscillator. A protocol core emits these; it knows neither servo nor steered clock.
+/// oscillator. A protocol core emits these; it knows neither servo nor steered clock. The two
+/// stamps lie a path delay apart, of which nothing is taken off; corrections that the network has
+/// measured (correctionField) and latencies of the interface are.
 struct EventPair {
   Direction direction = Direction::kForward;
   ReferenceTime reference;
@@ -46,9 +48,11 @@ struct SyncSample {
   LocalTime local;               ///< tau_l(n): t2 on the steered clock
   FreeRunningTime free_running;  ///< t2 on the free-running oscillator
 
-  /// tau_rd(n) = tau_r(n) + d_rl(n).
+  /// What the reference showed when the message was stamped here: tau_rd(n) = tau_r(n) + d_rl(n),
+  /// paper eq. (10).
   [[nodiscard]] constexpr ReferenceTime reference() const noexcept { return origin + path_delay; }
-  /// Perceived offset, local minus reference (noise included).
+  /// Perceived offset, local minus reference: the true one plus the noise of this one message. The
+  /// negative of the paper's T_offset.
   [[nodiscard]] constexpr Duration offset() const noexcept {
     return offset_from_reference(local, reference());
   }

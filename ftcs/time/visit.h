@@ -9,7 +9,8 @@ namespace ftcs {
 
 /// Calls the visitor with what the variant holds, as std::visit; which throws for a variant without
 /// a value, so that without exceptions abort() and what hangs on it is linked. Here such a variant
-/// is undefined: one of trivially copyable types never loses its value.
+/// is undefined: one of trivially copyable types never loses its value. The visitor must return the
+/// same type for each alternative; that is chosen by a chain of comparisons, one per alternative.
 template <std::size_t first = 0, class Visitor, class Variant>
 constexpr decltype(auto) visit(Visitor&& visitor, Variant& variant) {
   using Content = std::remove_const_t<Variant>;
