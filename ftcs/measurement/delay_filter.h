@@ -27,10 +27,16 @@ struct DelayFilterConfig {
 /// Moving median or minimum of the last `length` values. While fewer have come, of those. The
 /// median of an even number of values is the mean of the middle two. The steady mean is their
 /// median until all have come, and starts again from the newest that contradict it.
+///
+/// A median of n follows a true step after n / 2 values and bears nearly as many outliers; a
+/// minimum follows a shorter path at once and a longer one after n; a steady mean goes on improving
+/// for a thousand values, and follows a large step after four to ten (ShiftWatch). add() sorts at
+/// most kCapacity values; no value is refused here.
 class DelayFilter {
  public:
   static constexpr std::size_t kCapacity = 32;
 
+  /// A length out of range is pulled to the nearest one in it.
   constexpr explicit DelayFilter(DelayFilterConfig config) noexcept
       : kind_(config.kind),
         length_(std::clamp<std::size_t>(

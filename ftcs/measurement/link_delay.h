@@ -6,7 +6,9 @@
 namespace ftcs {
 
 /// The delay of a link that is measured beside the messages of time (peer delay, IEEE 1588-2019,
-/// 11.4): the same filter and the same limits as for an end-to-end path delay.
+/// 11.4): the same filter and the same limits as for an end-to-end path delay. Values come from
+/// ptp::PeerDelay, mean = ((t4 - t1) r - (t3 - t2)) / 2. The asymmetry of the configuration is not
+/// added: a port's own delayAsymmetry is in the stamps (11.6).
 class LinkDelay {
  public:
   explicit LinkDelay(const PathDelayConfig& config) noexcept

@@ -12,7 +12,9 @@ inline constexpr double kMadToSigma = 1.4826;
 
 /// The value that stood at `wanted`, were the first `size` of `values` sorted (Hoare's FIND, Comm.
 /// ACM 4, 1961); they are reordered. In place of std::nth_element, which calls memmove: the cycle
-/// servo's C library has but memcpy and memset. Valid: 0 <= wanted < size.
+/// servo's C library has but memcpy and memset. Valid: 0 <= wanted < size, and no value that is not
+/// a number. With size = 0 and wanted = 0 the first element is returned as it is. Linear on
+/// average, quadratic at worst.
 template <class Values>
 double order_statistic(Values& values, std::ptrdiff_t size, std::ptrdiff_t wanted) noexcept {
   const auto at = values.begin();

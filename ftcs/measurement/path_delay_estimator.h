@@ -12,6 +12,8 @@
 
 namespace ftcs {
 
+/// How path delays are measured and filtered. Valid: lowest <= highest, unchecked; else every raw
+/// delay is refused.
 struct PathDelayConfig {
   DelayFilterConfig filter{};
   Nanoseconds asymmetry{};  ///< delayAsymmetry, IEEE 1588-2019, 7.4.2: positive when reference to
@@ -24,6 +26,7 @@ struct PathDelayConfig {
   Nanoseconds highest{100'000'000};
 };
 
+/// What became of a backward message.
 enum class PathDelayVerdict : std::uint8_t {
   kUsed,       ///< the raw delay went into the filter
   kDeferred,   ///< kept until the next forward message tells the rate
@@ -51,6 +54,22 @@ struct PathDelayCounters {
 /// converted to reference time by the rate ratio of the last forward messages (median of their
 /// pairwise slopes, Theil 1950: one delayed message in a few cannot tilt it). A backward message
 /// that comes before two forward ones is completed by the second one.
+///
+///     d_raw = ((t4 - t1) - r (t3 - t2)) / 2        mean_path_delay(), t1 and t2 of the forward
+///                                                  message nearest to t3, at most 16 s away
+///     r = median of (t1_i - t1_j) / (t2_i - t2_j)  over the last eight forward messages
+///     path_delay = filter(d_raw) + asymmetry       DelayFilter; IEEE 1588-2019, 11.3.2 and 7.4.2
+///
+/// Forward messages are to come in the order of their stamps. One that is older than its
+/// predecessor, more than an hour later, or at a ratio outside 0.5 to 2 is taken for another
+/// reference: restart(), and what was measured before it keeps only its delays.
+///
+///     estimator.on_forward(t1, t2);                      // Sync
+///     const auto update = estimator.on_backward(t3, t4); // Delay_Req: kUsed, or why not
+///     if (estimator.known()) use(estimator.path_delay());
+///
+/// A value of some hundred octets. on_forward() looks at 28 slopes, on_backward() at eight
+/// messages; the filter sorts its values. No state depends on wall time: silence changes nothing.
 class PathDelayEstimator {
  public:
   explicit PathDelayEstimator(const PathDelayConfig& config) noexcept
@@ -59,11 +78,14 @@ class PathDelayEstimator {
   /// Sync: origin = t1 + corrections, received = t2. An exact repetition is ignored.
   void on_forward(ReferenceTime origin, FreeRunningTime received) noexcept;
   /// Delay_Req: sent = t3, received = t4 - corrections. May come late: its partner is the nearest
-  /// forward message.
+  /// forward message. Only kUsed has changed path_delay(). Of several that are kDeferred the last
+  /// one counts; what comes of it is told by counters() alone.
   PathDelayUpdate on_backward(FreeRunningTime sent, ReferenceTime received) noexcept;
 
+  /// An exchange of this reference has been used.
   [[nodiscard]] bool known() const noexcept { return !filter_.empty(); }
-  /// Delay from the reference to here: filtered mean path delay plus asymmetry. Zero until known.
+  /// Delay from the reference to here, in reference time: filtered mean path delay plus asymmetry.
+  /// Zero until known.
   [[nodiscard]] Duration path_delay() const noexcept {
     return known() ? forward_delay(mean_path_delay(), config_.asymmetry) : Duration{};
   }
@@ -71,6 +93,7 @@ class PathDelayEstimator {
   [[nodiscard]] Duration mean_path_delay() const noexcept { return filter_.value(); }
   /// The last raw delay that was accepted.
   [[nodiscard]] Duration latest() const noexcept { return latest_; }
+  /// Two forward messages or more since the last restart.
   [[nodiscard]] bool rate_known() const noexcept { return forward_count_ >= 2; }
   /// Rate of the reference in units of the free-running oscillator; 1 until known.
   [[nodiscard]] Rate rate_ratio() const noexcept { return rate_ratio_; }

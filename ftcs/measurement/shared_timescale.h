@@ -24,10 +24,12 @@ namespace ftcs {
 class SharedTimescale {
  public:
   enum class Verdict : std::uint8_t {
-    kOpen,
+    kOpen,     ///< fewer than kFewest differences, or none of the limits reached
     kShared,   ///< until kForeign
     kForeign,  ///< until reset()
   };
+  /// Differences before the first verdict, and how many the median is of: kShared is said from the
+  /// fewest on, where |median| <= 3 standard errors; kForeign only of a full window, beyond 8.
   static constexpr std::size_t kFewest = 4;
   static constexpr std::size_t kWindow = 64;
 
@@ -48,6 +50,7 @@ class SharedTimescale {
     unchecked_ = std::min(unchecked_ + 1, kUncheckedLimit);
     compare();
   }
+  /// Another port: all is open again.
   void reset() noexcept { *this = SharedTimescale{}; }
   [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
   /// When the last Sync came; before the first one the zero of time.

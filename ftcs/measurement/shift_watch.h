@@ -42,6 +42,7 @@ class OutlierChance {
 ///   cumulative sum (Page, Biometrika 41, 1954): S := max(0, S + clamp(difference / limit) - 0.3)
 class ShiftWatch {
  public:
+  /// One value, as the caller's centre and limit see it.
   struct Value {
     double part = 0.0;  ///< of the limit, -1 to 1
     bool outlier = false;

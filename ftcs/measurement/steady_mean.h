@@ -60,9 +60,11 @@ class SteadyMean {
     return watch_.add(watched);
   }
   [[nodiscard]] constexpr bool started() const noexcept { return seen_ > 0.0; }
+  /// ns; 0 before start().
   [[nodiscard]] constexpr double value() const noexcept {
     return late_only_ ? std::min(floor_, centre_) : centre_;
   }
+  /// Values are late or right, hardly ever early: value() is then their floor.
   [[nodiscard]] constexpr bool late_only() const noexcept { return late_only_; }
 
  private:
