@@ -56,16 +56,20 @@ inline constexpr ServoKindName kServoKinds[] = {
     {ServoKind::kKalman, "kalman"},     {ServoKind::kMinimumDelay, "minimum-delay"},
 };
 
+/// "unknown" for kExternal and for what is no kind.
 [[nodiscard]] std::string_view servo_kind_name(ServoKind kind) noexcept;
+/// The exact name; no value: there is no such servo.
 [[nodiscard]] std::optional<ServoKind> servo_kind_from_name(std::string_view name) noexcept;
 
 /// Everything that can be set about any servo. sync_interval and limits are common: make_servo()
 /// hands them to the law that is chosen (the interval unless it is zero; the limits narrowed by the
-/// law's own).
+/// law's own). two_way is the part in front of a classic law; of it the adaptive servo, the Kalman
+/// filter and the selection by delay take fixed_path_delay alone, where they have none themselves,
+/// and an external servo takes everything but the gate.
 struct ServoConfig {
   ServoKind kind = ServoKind::kAdaptive;
-  Nanoseconds sync_interval{0};
-  RateLimits limits{};
+  Nanoseconds sync_interval{0};  ///< in reference time; zero: the law's own, or measured
+  RateLimits limits{};           ///< local per free running
   TwoWayConfig two_way{};
   FtcsConfig ftcs{};
   PicsConfig pics{};
@@ -80,10 +84,19 @@ struct ServoConfig {
   ExternalConfig external{};
 };
 
-/// Of the chosen kind only.
+/// The first thing that is wrong with the common limits or the chosen kind, with the common
+/// settings filled in; no value: make_servo() may be called. Other kinds' settings and two_way are
+/// not looked at.
 [[nodiscard]] std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept;
 
 /// Any servo as one value, chosen at run time: a closed set, so no virtual functions and no heap.
+///
+///     ServoConfig config{.kind = ServoKind::kFtcs};
+///     if (const auto error = validate(config)) return describe(*error);
+///     AnyServo servo = make_servo(config);
+///
+/// As large as the adaptive servo. A program that needs one servo takes that servo's type instead,
+/// and links no other (BasicClockDiscipline).
 class AnyServo {
  public:
   using Variant =

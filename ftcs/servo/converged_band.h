@@ -18,6 +18,7 @@ struct ConvergedBand {
   Duration enter = kUnbounded;
   Duration leave = kUnbounded;
 
+  /// 0 <= enter <= leave. An enter of zero is never entered.
   [[nodiscard]] constexpr bool valid() const noexcept {
     return enter >= Duration{} && leave >= enter;
   }

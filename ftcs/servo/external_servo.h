@@ -37,8 +37,11 @@ class ExternalServo {
   explicit ExternalServo(const ExternalConfig& config) noexcept
       : config_(config), delay_(config.path_delay) {}
 
+  /// kRejected and kUsed as the library says; kImplausible for a command that was not obeyed.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
+  /// Calls the library's reset(), and forgets the path delay.
   void reset() noexcept;
+  /// The offset as the library believes it, where it has believe(); else as perceived.
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;
 
  private:

@@ -21,7 +21,7 @@ struct FreeRunningConfig {
 }
 
 /// Watches and never commands: offset, path delay and the ratio of the last two samples are
-/// telemetry only.
+/// telemetry only. The ratio holds the noise of two stamps: at 1 s and 50 ns each, 70 ppb.
 class FreeRunningServo {
  public:
   using Config = FreeRunningConfig;

@@ -10,6 +10,8 @@ namespace ftcs {
 
 /// What a servo has learnt that outlives it: facts about the oscillator and the network, from which
 /// the next run may start. A plain value; keeping it between runs is the application's business.
+/// rate_sigma is how far the rate is trusted: who keeps a state for days widens it by what the
+/// oscillator does in that time (temperature, ageing).
 struct LearntState {
   double rate_deviation = 0.0;      ///< y: free running per reference, less one
   double rate_sigma = 0.0;          ///< its standard deviation; > 0

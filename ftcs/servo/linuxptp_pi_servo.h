@@ -9,6 +9,7 @@
 
 namespace ftcs {
 
+/// Who stamps: ptp4l's time_stamping, as far as its servo asks.
 enum class TimestampingKind : std::uint8_t { kHardware, kSoftware };
 
 /// Options of ptp4l's PI servo under its documented names (ptp4l(8), pi_*), with its defaults.
@@ -19,10 +20,12 @@ struct LinuxptpPiConfig {
   /// Chooses the scales when they are zero: 0.7 and 0.3 for hardware stamps, 0.1 and 0.001 for
   /// software.
   TimestampingKind timestamping = TimestampingKind::kHardware;
+  // kp of T seconds is scale T^exponent, at most norm_max / T; or const, at most 1 / T. In 1/s.
   double proportional_const = 0.0;
   double proportional_scale = 0.0;
   double proportional_exponent = -0.3;
   double proportional_norm_max = 0.7;
+  // ki likewise; its const is capped at 2 / T.
   double integral_const = 0.0;
   double integral_scale = 0.0;
   double integral_exponent = 0.4;
@@ -36,6 +39,8 @@ struct LinuxptpPiConfig {
   RateLimits limits{};
 };
 
+/// The first thing that is wrong: kSyncInterval, kProportionalGain, kIntegralGain, kStepThreshold
+/// (negative), kRateLimits (limits, or max_frequency_ppb outside [0, 1e9)).
 [[nodiscard]] std::optional<ServoConfigError> validate(const LinuxptpPiConfig& config) noexcept;
 
 struct PiGains {
@@ -44,7 +49,8 @@ struct PiGains {
 };
 
 /// kp = min(scale T^exponent, norm_max / T), ki likewise, T in seconds, as ptp4l(8) gives them. A
-/// constant takes the place of scale T^exponent and is capped at 1/T (kp) or 2/T (ki).
+/// constant takes the place of scale T^exponent and is capped at 1/T (kp) or 2/T (ki). Valid:
+/// interval_s > 0. With the defaults and T = 1 s: kp 0.7, ki 0.3.
 [[nodiscard]] PiGains linuxptp_gains(const LinuxptpPiConfig& config, double interval_s) noexcept;
 
 /// A PI servo that behaves as linuxptp's does (its documented behaviour; independent code), so that
@@ -62,11 +68,15 @@ class LinuxptpPiServo {
 
   explicit LinuxptpPiServo(const LinuxptpPiConfig& config = {}) noexcept;
 
+  /// A step, where one is due, is in the command: whoever applies it decides whether it may be
+  /// (StepPolicy). kDuplicate: not newer on the oscillator. kImplausible: the reference went
+  /// backward during s0.
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept;
   /// Back to s0. The drift stays in use until two samples have given a new one; a first step is not
   /// repeated.
   void reset() noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
+  /// Zero until the interval is known.
   [[nodiscard]] PiGains gains() const noexcept { return gains_; }
 
  private:

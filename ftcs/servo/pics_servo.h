@@ -14,9 +14,9 @@ struct PicsConfig {
   /// [T] Interval between samples in reference time. Zero: measured, so that the first command
   /// comes with the second sample.
   Nanoseconds sync_interval{0};
-  /// [k_p k_c T] Dimensionless; 1 is the paper's optimum (Table 3).
+  /// [k_p k_c T] Dimensionless; 1 is the paper's optimum (Table 3). Stable: 0 < K_p < 2.
   double proportional_gain = 1.0;
-  /// [k_i k_c T] Dimensionless; 1 is the paper's optimum (Table 3).
+  /// [k_i k_c T] Dimensionless; 1 is the paper's optimum (Table 3). Stable: 0 < K_i < 4 - 2 K_p.
   double integral_gain = 1.0;
   /// e(-1): equal to e(0) when false (no proportional kick at the start), zero when true.
   bool previous_error_starts_at_zero = false;
@@ -28,6 +28,8 @@ struct PicsConfig {
   RateLimits plausible_ratio{};
 };
 
+/// The first thing that is wrong: kSyncInterval, kProportionalGain, kIntegralGain (negative or not
+/// finite), kRateLimits, kPlausibleRatio. Gains that are unstable are not refused.
 [[nodiscard]] std::optional<ServoConfigError> validate(const PicsConfig& config) noexcept;
 
 /// The PI clock servo that the paper compares with (PICS, eq. 26), in incremental form with
@@ -38,13 +40,22 @@ struct PicsConfig {
 /// A closed loop on the steered clock. The limited rate is its only integrator, so that it cannot
 /// wind up. Holds its rate until the next sample (no correction that expires). Acts on its first
 /// sample. Never steps.
+///
+/// The error follows e(n+1) = (2 - K_p - K_i) e(n) - (1 - K_p) e(n-1): with both gains 1 it is gone
+/// after two intervals (deadbeat), with smaller ones noise is averaged and a start takes longer. A
+/// lost message leaves the last rate on for another interval, correction included.
+///
+/// The sample's offset is used as it is, without projection to the moment of the command.
 class PicsServo {
  public:
   using Config = PicsConfig;
 
+  /// Valid: validate(config) finds nothing; it is not asked here.
   explicit PicsServo(const PicsConfig& config = {}) noexcept
       : config_(config), rate_(config.limits.clamp(config.initial_rate)) {}
 
+  /// kUsed: a command (none with the first sample, if the interval is to be measured). kDuplicate:
+  /// nothing has changed. kImplausible: reset(), and the sample is left out.
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept;
   /// Forgets e(n-1); keeps the rate, because it belongs to the oscillator more than to the
   /// reference.

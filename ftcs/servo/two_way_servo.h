@@ -10,7 +10,8 @@
 
 namespace ftcs {
 
-/// What every classic servo needs in front of its control law.
+/// What every classic servo needs in front of its control law. Nothing is checked; see PathDelay-
+/// and OutlierGateConfig for what is valid.
 struct TwoWayConfig {
   PathDelayConfig path_delay{};
   /// A path delay known otherwise (peer delay, wiring): backward messages are then not used. May be
@@ -28,16 +29,29 @@ struct TwoWayConfig {
 /// message plus elapsed time times rate ratio), not the control error: steering cannot look like an
 /// outlier. A rejected message reaches neither the law nor the path delay. When the gate gives way,
 /// the law starts anew, while the clock keeps its last command.
+///
+///     innovation = t1_a + r (t2 - t2_a) - t1        r: rate ratio of the last forward messages,
+///                                                   a: last accepted message; positive: late
+///
+/// The law is silent until a path delay is known: given, or measured by one exchange. Its first
+/// sample may then be the message before (prime()), so that FTCS commands with the first exchange
+/// and one more Sync.
+///
+///     TwoWayServo<FtcsServo> servo({.fixed_path_delay = 10us}, {.offset_gain = 1.0 / 8.0});
 template <ControlLaw Law>
 class TwoWayServo {
  public:
   TwoWayServo(const TwoWayConfig& config, const typename Law::Config& law) noexcept
       : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
 
+  /// Forward: the law's verdict and command; kRejected by the gate, kDuplicate for a message that
+  /// is newer than the last one on neither clock. Backward: never a command; kImplausible where the
+  /// path delay it tells is impossible (PathDelayConfig), kUsed for any other, even without a use.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept {
     return pair.direction == Direction::kForward ? on_forward(pair, now) : on_backward(pair);
   }
 
+  /// Another reference: messages, delays and what the gate has learnt are void.
   void reset() noexcept {
     delay_.reset();
     gate_.reset();
@@ -50,6 +64,7 @@ class TwoWayServo {
     if constexpr (requires { law_.on_step(step); }) law_.on_step(step);
   }
 
+  /// The law's, with the path delay as known now and offset_known: the law has been fed.
   [[nodiscard]] ServoSnapshot snapshot() const noexcept {
     ServoSnapshot snapshot = law_.snapshot();
     snapshot.offset_known = law_fed_;

@@ -13,6 +13,7 @@ struct FrequencyCompensatedConfig {
   RateLimits limits{};
 };
 
+/// kSyncInterval or kRateLimits.
 [[nodiscard]] inline std::optional<ServoConfigError> validate(
     const FrequencyCompensatedConfig& config) noexcept {
   if (config.sync_interval < Nanoseconds{0}) return ServoConfigError::kSyncInterval;
@@ -34,6 +35,7 @@ class FrequencyCompensatedServo {
   explicit FrequencyCompensatedServo(const FrequencyCompensatedConfig& config = {}) noexcept
       : config_(config) {}
 
+  /// Commands from the second sample on. A sample that is not newer on both clocks is kDuplicate.
   ServoUpdate update(const SyncSample& sample, const ClockReading&) noexcept {
     snapshot_.offset = sample.offset();
     snapshot_.path_delay = sample.path_delay;

@@ -19,7 +19,12 @@ struct KalmanNoise {
 ///
 /// With a known delay (variance 0) it is the two-state filter. Process noise over an interval t
 /// (Brown and Hwang; one-dimensional constant-velocity model): Q_xx = w t + q t^3/3, Q_xy = q
-/// t^2/2, Q_yy = q t.
+/// t^2/2, Q_yy = q t. Correction, with h = (1, 0, g) and R the message's variance:
+///
+///     S = h P h' + R,   K = P h' / S,   state += K (z - h state),   P -= K h P
+///
+/// Starts from zero with 1 s, 1000 ppm and 1 ms of standard deviation: offsets are given less a
+/// base, so that they begin small.
 class KalmanFilter {
  public:
   struct State {
@@ -33,7 +38,9 @@ class KalmanFilter {
   /// One message: seconds since the last one (may be negative by the path delay), sign g,
   /// observation z.
   void update(double elapsed_s, double sign, double z) noexcept;
+  /// At the event of the last message.
   [[nodiscard]] const State& state() const noexcept { return state_; }
+  /// Square roots of P's diagonal, after the last message.
   [[nodiscard]] double offset_sigma_ns() const noexcept;
   [[nodiscard]] double rate_sigma_ppb() const noexcept;
   [[nodiscard]] double delay_sigma_ns() const noexcept;

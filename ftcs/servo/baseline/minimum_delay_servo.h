@@ -26,6 +26,7 @@ struct MinimumDelayConfig {
   std::uint32_t window = 32;  ///< of kWindow, 1 to 4096 exchanges
 };
 
+/// The first thing that is wrong: kSyncInterval, kRateLimits, kWindow.
 [[nodiscard]] std::optional<ServoConfigError> validate(const MinimumDelayConfig& config) noexcept;
 
 /// Baseline: selection by the delay of exchanges, as clients of NTP do it (Mills, RFC 5905, section
@@ -42,6 +43,9 @@ class MinimumDelayServo {
 
   explicit MinimumDelayServo(const MinimumDelayConfig& config = {}) noexcept : config_(config) {}
 
+  /// Commands with the backward message that completes an exchange (kWindow: a window; with a known
+  /// delay each forward message), from the third point on; the offset is removed over one interval.
+  /// At most 64 points are fitted, some twenty times where the line is bent.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept { *this = MinimumDelayServo(config_); }
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }

@@ -20,6 +20,7 @@ struct PidConfig {
   RateLimits limits{};
 };
 
+/// The first thing that is wrong; kProportionalGain stands for the derivative gain too.
 [[nodiscard]] inline std::optional<ServoConfigError> validate(const PidConfig& config) noexcept {
   const auto possible = [](double gain) { return std::isfinite(gain) && gain >= 0.0; };
   if (config.sync_interval < Nanoseconds{0}) return ServoConfigError::kSyncInterval;
@@ -34,6 +35,9 @@ struct PidConfig {
 /// -offset:
 ///
 ///   a(n+1) = a(n) + [K_p (e(n) - e(n-1)) + K_i e(n) + K_d (e(n) - 2 e(n-1) + e(n-2))] / T
+///
+/// Acts on its first sample if the interval is configured. An implausible ratio is not looked for:
+/// the loop follows whatever it is told.
 class PidServo {
  public:
   using Config = PidConfig;

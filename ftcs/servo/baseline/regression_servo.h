@@ -15,6 +15,7 @@ struct RegressionConfig {
   RateLimits limits{};
 };
 
+/// kSyncInterval or kRateLimits.
 [[nodiscard]] std::optional<ServoConfigError> validate(const RegressionConfig& config) noexcept;
 
 /// Baseline: growing-window linear regression, as linuxptp's linreg servo behaves (its documented
@@ -30,6 +31,8 @@ class RegressionServo {
 
   explicit RegressionServo(const RegressionConfig& config = {}) noexcept : config_(config) {}
 
+  /// Commands from the fourth sample on. A ratio outside 0.5 to 1.5, or time that went backward, is
+  /// kImplausible and ends the line: the next one needs four samples again.
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept;
   void reset() noexcept { *this = RegressionServo(config_); }
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
