@@ -14,7 +14,8 @@
 
 namespace ftcs {
 
-/// What holds whatever the servo.
+/// What holds whatever the servo. Nothing is checked here: valid are bands with 0 <= enter <=
+/// leave, bounds that are not negative, and at least one missed interval.
 struct DisciplineRules {
   StepPolicy step{};
   LockConfig lock{};
@@ -31,7 +32,8 @@ struct DisciplineRules {
   std::uint32_t missed_intervals_to_holdover = 4;
 };
 
-/// What the discipline has to know of its servo.
+/// What the discipline has to know of its servo. ClockDiscipline fills it in for the servos of the
+/// library; who brings his own says so here.
 struct ServoTraits {
   RateLimits limits{};           ///< narrowed by the clock's own
   RateLimits slewing{};          ///< what it uses of them to remove an offset
@@ -48,8 +50,23 @@ struct ServoTraits {
 /// (AdjustableClock), so that a lost message does no harm. Counts and reports; decides nothing
 /// about frequency or offset.
 ///
+/// A command passes, in this order:
+///
+///     offset     beyond largest_offset, and no step permitted: not acted on, the rate is kept
+///     step       |offset| > threshold and permitted: step = -offset, at the tracking rate, unless
+///                the servo decides steps; permitted otherwise: as the servo asks; else none
+///     rate       |change| <= largest_rate_change, at the command and at the end of its correction
+///     limits     slowest <= rate <= fastest, of servo and clock together; not a number: 1
+///     clock      apply(); on its error the last command stays in force
+///
 /// Of one servo, chosen by the program: nothing of any other is linked. ClockDiscipline has the
 /// one that its configuration names.
+///
+///     ClockDiscipline discipline({}, clock);              // examples/01_lock_a_clock.cpp
+///     discipline.on_pair({Direction::kForward, t1, t2});  // Sync
+///     const Telemetry seen = discipline.on_pair({Direction::kBackward, t4, t3});  // Delay_Req
+///
+/// One thread. A call costs one reading of the clock, the servo's update, and at most one command.
 template <ClockServo Servo>
 class BasicClockDiscipline {
  public:
@@ -67,14 +84,21 @@ class BasicClockDiscipline {
         rate_change_(rules.largest_rate_change),
         sync_interval_(servo.sync_interval) {}
 
-  /// Before the first message: from now on at this rate, which somebody knows already.
+  /// Before the first message: from now on at this rate (local per free running), which somebody
+  /// knows already; cut to the limits. The clock's error, if it did not take it. It does not count
+  /// as the first command: a first step is still to come.
   [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept;
-  /// `paces`: such pairs come once a Sync interval; the forward ones are the samples, make the
-  /// lock, and are missed when they stay away. Others are heard and no more.
+  /// A message of either direction, at any time after its stamps, in the order in which they became
+  /// known. `paces`: such pairs come once a Sync interval; the forward ones are the samples, make
+  /// the lock, and are missed when they stay away. Others are heard and no more.
+  ///
+  /// What came of it is in the telemetry: verdict, whether a command was given, why not
+  /// (offset_refused, error), lock and state. The same is kept as latest().
   Telemetry on_pair(const EventPair& pair, bool paces = true) noexcept;
   /// To be called when nothing has come for a while, as often as liked: samples missing for
   /// missed_intervals_to_holdover sync intervals mean holdover. The clock keeps its tracking
-  /// rate.
+  /// rate. A servo that knows its deviation states it as of now, grown since the last message.
+  /// Nothing is said before the first sample: without an interval there is no silence.
   Telemetry on_silence() noexcept;
   /// What the time transmitter says of its Sync interval; zero: nothing. Messages that come in a
   /// burst are then not taken for a shorter one.
@@ -95,6 +119,7 @@ class BasicClockDiscipline {
 
   /// Used since this reference is followed.
   [[nodiscard]] std::uint32_t samples() const noexcept { return samples_; }
+  /// What the last call told.
   [[nodiscard]] const Telemetry& latest() const noexcept { return telemetry_; }
   [[nodiscard]] const DisciplineCounters& counters() const noexcept { return counters_; }
   /// Never without a path delay: what it hides from the offset may be any length.

@@ -6,6 +6,7 @@
 
 namespace ftcs {
 
+/// The rules, and the servo with all that can be set about it.
 struct DisciplineConfig : DisciplineRules {
   ServoConfig servo{};  ///< its limits are narrowed by the clock's own
 };
@@ -15,7 +16,9 @@ extern template class BasicClockDiscipline<AnyServo>;
 /// BasicClockDiscipline of the servo that the configuration names.
 class ClockDiscipline : public BasicClockDiscipline<AnyServo> {
  public:
-  /// The clock must outlive the discipline. Valid: validate(config.servo) finds nothing.
+  /// The clock must outlive the discipline. Valid: validate(config.servo) finds nothing; it is not
+  /// asked here. Beside largest_rate_change the adaptive servo plans with half of it, so that the
+  /// end of a correction keeps to it too.
   ClockDiscipline(const DisciplineConfig& config, AdjustableClock& clock) noexcept;
 };
 

@@ -17,7 +17,8 @@ struct NoAdaptiveServo {
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return {}; }
 };
 
-/// What one frame told of the phase: the reference showed so much when the steered clock did.
+/// What one frame told of the phase: the reference showed so much when the steered clock did, both
+/// at the instant `stamp` of the host. E = local - reference, the transit taken off.
 struct CyclePhase {
   ReferenceTime reference;
   LocalTime local;
@@ -71,19 +72,45 @@ struct MessageCycleLaw {
 ///
 /// k(n) is formed from unwrapped reference time: a phase alone, modulo the cycle, locks happily to
 /// a rate that is wrong by one cycle per interval. A value; nothing waits, nothing allocates.
+///
+///     CycleServo servo(CycleServoConfig{});               // examples/05_cycle_servo.cpp
+///     CycleDecision next = servo.start(now());
+///     for (;;) {
+///       sleep_until(next.wake);                           // CLOCK_MONOTONIC, nobody steers it
+///       const CycleSample seen = exchange_frame();        // stamps, and 0x0910 of the reference
+///       next = servo.update(seen, now());
+///     }
+///
+/// On the way from a sample to the next trigger:
+///
+///     gates      a late sender, a slow frame, a lost one: coasted over, at the last rate
+///     anchor     the first good sample sets the steered clock; the phase is that of `shift`
+///     E          local_at(sent) - (reference - transit), early positive
+///     doubt      a phase unlike its neighbours': the next cycle is asked, five are the truth
+///     law        FTCS, PICS: one sample in cycles_per_sync; adaptive: all. Rates within F
+///     trigger    the next multiple of the cycle on the steered clock, on the timer's grid
+///
+/// Three phases in a row beyond three quarters of a cycle mean that the reference has restarted:
+/// anchored anew. Constant work but for two medians of 32 values where a phase decides something;
+/// one thread.
 template <class Adaptive>
 class BasicCycleServo {
  public:
+  /// Valid: what CycleServoConfig says of its fields; nothing is checked here (the C interface
+  /// does, ftcs_cycle_init()).
   explicit BasicCycleServo(const CycleServoConfig& config) noexcept;
 
-  /// The first trigger: one cycle from now.
+  /// The first trigger: one cycle from now. Everything known of a phase is void; counters stay.
   [[nodiscard]] CycleDecision start(FreeRunningTime now) noexcept;
-  /// A cycle is over: what its frame told, at `now`. Returns the next trigger.
+  /// A cycle is over: what its frame told, at `now`. Returns the next trigger, which lies after
+  /// `now`: cycles that a stall passed over are counted in `skipped` and not made up for.
+  /// start() comes first.
   [[nodiscard]] CycleDecision update(const CycleSample& sample, FreeRunningTime now) noexcept;
 
   [[nodiscard]] const CycleServoCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] const CycleServoConfig& config() const noexcept { return config_; }
-  /// Reference time that the steered clock believes in at an instant of the host.
+  /// Reference time that the steered clock believes in at an instant of the host; before the first
+  /// good sample it counts from start().
   [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept {
     return history_.local_at(instant);
   }

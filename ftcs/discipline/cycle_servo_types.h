@@ -11,7 +11,13 @@
 
 namespace ftcs {
 
-enum class CycleLaw : std::uint8_t { kNone, kFtcs, kPics, kAdaptive };
+/// What follows the reference.
+enum class CycleLaw : std::uint8_t {
+  kNone,     ///< nothing: phase and lock are told
+  kFtcs,     ///< eq. 25: k(n) from two samples, E removed in one interval outside B
+  kPics,     ///< eq. 26: incremental PI
+  kAdaptive  ///< the adaptive servo, at each cycle; nothing to tune
+};
 
 /// What a trigger is taken for when its cycle is compared with the reference.
 enum class TriggerModel : std::uint8_t {
@@ -19,6 +25,8 @@ enum class TriggerModel : std::uint8_t {
   kIdeal,  ///< as the paper: as if it had fired at its virtual instant
 };
 
+/// A cycle and its servo. Above zero must be: cycle, resolution, cycles_per_sync; not below zero:
+/// gates, gains (offset_gain at most 1); limits.valid(). BasicCycleServo does not check.
 struct CycleServoConfig {
   CycleLaw law = CycleLaw::kFtcs;
   Nanoseconds cycle{1'000'000};  ///< in reference time; above zero
@@ -33,7 +41,7 @@ struct CycleServoConfig {
   /// scatter by less than 1 us: whatever is further off than 5 us is no noise, and eq. 18 removes
   /// in one interval what p inside the band would trickle away.
   ConvergedBand band{Nanoseconds{5'000}, Nanoseconds{5'000}};
-  std::uint32_t converged_dwell = 1;
+  std::uint32_t converged_dwell = 1;  ///< FTCS: samples within B before p is offset_gain
   /// PICS: k_p and k_i of eq. 26 times the cycles per interval. 1 and 1 is deadbeat.
   double proportional_gain = 1.0;
   double integral_gain = 1.0;
@@ -60,12 +68,13 @@ struct CycleServoConfig {
   TriggerModel trigger = TriggerModel::kKnown;
 };
 
-/// What is known about one cycle. Times of the host that nobody steers (FreeRunningTime).
+/// What is known about one cycle. Times of the host are readings of one clock that nobody steers
+/// (FreeRunningTime): the one that the wake-up uses.
 struct CycleSample {
   bool has_reference = false;  ///< false: the frame was lost
-  ReferenceTime reference;     ///< latched when the frame passed; 64 bits, no wrap
-  FreeRunningTime sent;
-  bool has_received = false;
+  ReferenceTime reference;     ///< 0x0910, latched when the frame passed; 64 bits, no wrap
+  FreeRunningTime sent;        ///< as close to the wire as there is a stamp; always set
+  bool has_received = false;   ///< false: no frame is called slow
   FreeRunningTime received;
   /// The wake-up of the cycle that sent the frame, where that is not the latest one: loops that
   /// take a frame back when the next cycle begins.
@@ -73,6 +82,7 @@ struct CycleSample {
   FreeRunningTime scheduled;
 };
 
+/// How the cycle stands to its reference.
 enum class CycleState : std::uint8_t {
   kWaiting,    ///< no reference time yet
   kAcquiring,  ///< not yet in phase, or not yet long enough
@@ -80,6 +90,8 @@ enum class CycleState : std::uint8_t {
   kCoasting,  ///< was locked; no usable sample for coast_limit cycles
 };
 
+/// What became of the last sample; only kUsed reaches law and lock (kDoubtful the adaptive law too,
+/// which weighs for itself).
 enum class CycleVerdict : std::uint8_t {
   kUsed,        ///< phase known
   kLost,        ///< no reference time
@@ -89,7 +101,7 @@ enum class CycleVerdict : std::uint8_t {
   kDoubtful,    ///< phase known, but alone among its neighbours: no law and no lock hears it
 };
 
-/// What comes of a cycle.
+/// What comes of a cycle. phase_error is that of the last good sample, where this one is none.
 struct CycleDecision {
   FreeRunningTime wake;             ///< of the next trigger, on the timer's grid
   FreeRunningTime virtual_instant;  ///< where it would be without the grid
@@ -97,8 +109,8 @@ struct CycleDecision {
   CycleVerdict verdict = CycleVerdict::kLost;
   /// E of eq. 25: positive when the cycle comes early. Of the virtual trigger (kKnown).
   Duration phase_error{};
-  Duration lateness{};        ///< of this frame against its trigger
-  Rate rate;                  ///< reference per host time that is being followed
+  Duration lateness{};        ///< of this frame against its trigger: sent minus scheduled
+  Rate rate;                  ///< reference per host time that is being followed; 1 until commanded
   bool commanded = false;     ///< the law acted
   std::uint64_t skipped = 0;  ///< cycles that a stall passed over
 };

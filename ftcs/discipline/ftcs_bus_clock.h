@@ -40,8 +40,9 @@ enum ftcs_bus_error {
                                sync0_phase not within 0 to 1 */
 };
 
+/* Begin with ftcs_bus_default_config(). Valid ranges: enum ftcs_bus_error. */
 typedef struct ftcs_bus_config {
-  int64_t cycle_ns;
+  int64_t cycle_ns;           /* between two calls of ftcs_bus_update() */
   int64_t sample_interval_ns; /* of the cycles of so long a time the median is heard; 125 ms */
   int64_t time_constant_ns;   /* an offset is removed with it, where no limit binds; 500 ms */
   double sync0_phase;         /* SYNC0 comes this part of a cycle after the frame; 0.5 */

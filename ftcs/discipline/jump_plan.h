@@ -14,6 +14,7 @@ enum class JumpResponse : std::uint8_t {
   kRefused,  ///< farther than largest_offset, and no step is permitted: as at the start
 };
 
+/// What will be done about it, told before it is done.
 struct JumpPlan {
   JumpResponse response = JumpResponse::kSlewed;
   /// How long slewing takes at the fastest rate that is permitted: |jump| / (rate / tracking - 1).

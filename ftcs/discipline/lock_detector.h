@@ -7,6 +7,8 @@
 
 namespace ftcs {
 
+/// When a clock counts as locked. The defaults suit a network with stamps of the kernel; a cycle
+/// has its own (CycleServoConfig::lock).
 struct LockConfig {
   /// Locked below `enter`, lost at or above `leave`.
   ConvergedBand band{Nanoseconds{10'000}, Nanoseconds{100'000}};
@@ -19,6 +21,7 @@ class LockDetector {
  public:
   explicit LockDetector(const LockConfig& config = {}) noexcept : config_(config) {}
 
+  /// The next offset, local minus reference; true while locked.
   bool update(Duration offset) noexcept {
     return latch_.update(offset.ns(), config_.band, config_.dwell);
   }

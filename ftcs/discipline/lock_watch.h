@@ -11,6 +11,7 @@ class LockWatch {
  public:
   enum class Change : std::uint8_t { kNone, kLocked, kLost };
 
+  /// Once in a cycle. Says what has changed since the last one.
   Change update(bool locked) noexcept {
     ++cycles_;
     if (locked == locked_) return Change::kNone;

@@ -11,6 +11,11 @@ namespace ftcs {
 /// Keeps the rate of a clock from changing by more than so much at a time: by a command, by the end
 /// of its correction, or by a command that comes before that end. Drives that follow the clock, or
 /// an oscillator, bear no more.
+///
+///     |a_c - a| <= largest,   |a_t - a_c| <= largest
+///
+/// a_c, a_t: correction and tracking rate of the command; a: any rate that may be in force when it
+/// takes effect. What is cut off an offset's correction is left for the next command.
 class RateChangeLimit {
  public:
   /// `largest`: dimensionless; zero: any.
@@ -26,6 +31,7 @@ class RateChangeLimit {
     tracking_ = correction_ = 1.0 + (passed - window).ns() / kWindowNs;
   }
 
+  /// The command that comes nearest to `command`. A rate that is not a number is left as it is.
   [[nodiscard]] ServoCommand limited(ServoCommand command, FreeRunningTime now) const noexcept {
     if (largest_ <= 0.0) return command;
     // The correction may be over by the time at which the command takes effect, or not yet.

@@ -27,7 +27,8 @@ struct DisciplineCounters {
 };
 
 /// What one message (or its absence) came to: small, plain, copied by the one thread that owns the
-/// discipline.
+/// discipline. direction, verdict and the rates are those of the last message where a call was none
+/// (on_silence()). Rates are local per free running.
 struct Telemetry {
   Direction direction = Direction::kForward;
   SampleVerdict verdict = SampleVerdict::kUsed;

@@ -29,6 +29,9 @@ struct BoundRules {
 ///
 ///     time(f) = time + rate (f - at)      half width(f) = bound_ns + growth |f - at|
 ///     bound = sigmas sigma_offset + unknown,  growth = sigmas sigma_rate + wander
+///
+/// True time lies within time_at(f) ± half_width_ns(f), if the path has no asymmetry beyond
+/// `unknown`. Between messages it widens by itself; nobody has to be asked.
 struct TimeBound {
   enum class State : std::uint8_t { kUnknown, kUnlocked, kLocked, kHoldover };
   State state = State::kUnknown;
@@ -47,7 +50,7 @@ struct TimeBound {
 };
 
 /// From what ClockDiscipline::on_silence() or on_pair() told. Unknown, where the servo does not
-/// know its own deviation, or no path delay is known.
+/// know its own deviation (the adaptive servo and the Kalman filter do), or no path delay is known.
 /// `samples`: ClockDiscipline::samples().
 [[nodiscard]] inline TimeBound time_bound(const Telemetry& telemetry, std::uint32_t samples,
                                           const BoundRules& rules = {}) noexcept {
