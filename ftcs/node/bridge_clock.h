@@ -29,7 +29,8 @@ class BridgeClock {
   void start(bool is_reference) noexcept { is_reference_ = is_reference; }
   /// A frame found the reference clock at `dc`, with so much added to its offset.
   void on_frame(LocalTime dc, std::int64_t offset_ns) noexcept;
-  /// The process data of the same frame.
+  /// The process data of the same frame, after on_frame(). The first pair of a start is not used:
+  /// it may be as old as the terminal is.
   void on_inputs(const ethercat::bridge::Inputs& inputs) noexcept;
   /// Plant time when that frame passed the reference. `tracking`: the rate of plant time per
   /// crystal, as far as it is known. None: no new stamps for kLargestAge.

@@ -17,6 +17,7 @@
 
 namespace ftcs::node {
 
+/// What the follower adds to the discipline. peer_to_peer fixes the servo's path delay at zero.
 struct ClockFollowerConfig {
   DisciplineConfig discipline{};
   /// The delay of the link is measured beside the pairs (on_link_delay()) and taken off before the
@@ -35,6 +36,15 @@ struct ClockFollowerConfig {
 ///     event:  local - (reference ± link delay) = offset ± (path delay - link delay)
 ///
 /// Without I/O. After each input the events are to be taken with next() until there is none.
+///
+/// A pair passes: the gate (else it is dropped without a word), end to end the bound on its path
+/// delay (else kPathDelayRefused), peer to peer the wait for a first link delay; then the
+/// discipline. For stamps of any source: ReceiverNode feeds it those of a PTP port, a replay those
+/// of a file.
+///
+///     ClockFollower follower(config, clock);
+///     follower.on_pair({Direction::kForward, t1, t2}, Duration{1s});
+///     while (const auto event = follower.next()) record(*event);
 class ClockFollower {
  public:
   /// Clock and gate must outlive the follower; without a gate everything may steer. Valid:
@@ -46,7 +56,7 @@ class ClockFollower {
   [[nodiscard]] std::optional<ClockError> start_at(Rate rate) noexcept {
     return discipline_.start_at(rate);
   }
-  /// `sync_interval`: of the source, where it is known.
+  /// `sync_interval`: of the source, where it is known; it decides from when on silence is one.
   void on_pair(const EventPair& pair, std::optional<Duration> sync_interval) noexcept;
   /// Peer to peer: one exchange beside the pairs, first of all the delay of the link. Until there
   /// is one, nothing is steered: the newest pair waits. With stamps, the neighbour is the

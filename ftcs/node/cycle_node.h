@@ -32,6 +32,8 @@ enum class BusWrite : std::uint8_t {
   kReadTime,    ///< plant time as read before the frame is sent to 0x0910: late as the stack is
 };
 
+/// A segment, its cycle and who follows whom. Valid as each part says of its fields; not checked
+/// here. servo.cycle is the cycle of everything, servo.shift its place on the grid of system time.
 struct CycleNodeConfig {
   /// Its process.objects, cycle and sync0_shift are set by the node. Where process.bridge has a
   /// value, plant time is that of a bridge terminal, whatever the stamps of the frames bring.
@@ -67,21 +69,36 @@ struct CycleNodeConfig {
 /// After stop(), or when a rule stopped the drives, next_frame() sends them to SAFEOP until
 /// stopped() is true. Some 100 KB; nothing is allocated. Not to be copied: the configuration of the
 /// drives refers to the node's own memory.
+///
+/// Times of one cycle, all of them of the reference's system time S, T the cycle:
+///
+///     frame    S = m T + shift                                 the trigger of the cycle servo
+///     SYNC0    S = m T + shift + sync0_phase T                 start time 0x0990, cycle 0x09A0
+///     margin   from the frame's passage to SYNC0, in [0, T)    margin_ns()
+///
+/// Offsets: E is positive when the cycle comes early (CycleServo); bus().dc_to_plant is positive
+/// when the bus is ahead of plant time. Sources: ETG.1000.4 (distributed clocks), ETG.1020
+/// (synchronisation, 0x10F1), CiA 402 (axes), decision 0017 (how the bus is moved).
+///
+/// One thread, at the pace of the cycle; the work of each call is bounded.
 class CycleNode {
  public:
   explicit CycleNode(const CycleNodeConfig& config) noexcept;
   CycleNode(const CycleNode&) = delete;
   CycleNode& operator=(const CycleNode&) = delete;
 
+  /// During bring-up and the way down, and in the cyclic part by begin_cycle(): what is to be sent,
+  /// from the EtherCAT header on; valid until the next call, empty when stopped.
   [[nodiscard]] ethercat::ConstBytes next_frame() noexcept { return main_.next_frame(); }
   /// What came back; kIgnored: not the answer that is waited for.
   ethercat::FrameOutcome on_frame(ethercat::Bytes frame,
                                   const ethercat::FrameStamps& stamps) noexcept {
     return main_.on_frame(frame, stamps);
   }
+  /// It does not come any more. In the cyclic part end_cycle(false, ...) says it.
   ethercat::FrameOutcome on_timeout() noexcept { return main_.on_timeout(); }
 
-  /// The cyclic part begins: the first trigger.
+  /// The cyclic part begins, once cyclic() is true: the first trigger.
   const CycleDecision& start(FreeRunningTime now) noexcept;
   /// At a trigger: the axes move, the frame of the cycle is written. `plant`: plant time now, for
   /// BusWrite::kTargetTime and kReadTime alone.
@@ -94,7 +111,9 @@ class CycleNode {
   /// All drives to SAFEOP; go on with next_frame() until stopped().
   void stop() noexcept { main_.stop(); }
 
+  /// All SubDevices are in SAFEOP or OP, and frames leave at the triggers.
   [[nodiscard]] bool cyclic() const noexcept { return main_.cyclic(); }
+  /// Nothing is left to be sent; main().failure() says why, if not on request.
   [[nodiscard]] bool stopped() const noexcept { return main_.stage() == ethercat::Stage::kStopped; }
   [[nodiscard]] const ethercat::MainDevice& main() const noexcept { return main_; }
   [[nodiscard]] const CycleServo& servo() const noexcept { return servo_; }
@@ -108,6 +127,7 @@ class CycleNode {
   [[nodiscard]] const CycleDecision& decision() const noexcept { return decision_; }
   /// What the servo was told about the last cycle.
   [[nodiscard]] const CycleSample& sample() const noexcept { return sample_; }
+  /// Of the last cycle; valid until the next begin_cycle().
   [[nodiscard]] std::span<const CycleNote> notes() const noexcept { return notes_.all(); }
   /// From the last frame's arrival at the reference to the SYNC0 that follows, ns in [0, cycle).
   [[nodiscard]] std::int64_t margin_ns() const noexcept;

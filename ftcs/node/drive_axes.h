@@ -11,6 +11,7 @@
 
 namespace ftcs::node {
 
+/// What the axes do. Positions are relative: an axis starts from where it stands.
 struct DriveAxesConfig {
   bool move = true;          ///< false: all axes stay disabled
   double radius = 10'000.0;  ///< of the circles, counts

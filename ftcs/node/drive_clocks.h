@@ -11,8 +11,9 @@
 namespace ftcs::node {
 
 /// How far the clock of each drive is from the reference's: |0x092C|, the mean difference as the
-/// drive's own controller filters it, read from one drive in each cycle. Judged from `settled` on,
-/// which is some time after the start.
+/// drive's own controller filters it, read from one drive in each cycle (ETG.1000.4, Distributed
+/// Clocks: system time difference). With n drives each is looked at every n cycles. Judged from
+/// `settled` on, which is some time after the start.
 class DriveClocks {
  public:
   /// Of one drive, ns.

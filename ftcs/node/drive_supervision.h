@@ -19,7 +19,7 @@ enum class LockPolicy : std::uint8_t {
   kFatal,       ///< the drives are stopped at once
 };
 
-/// Limits in cycles.
+/// Limits in cycles. unlocked_limit and recovery_interval must be above zero, unchecked.
 struct DriveSupervisionConfig {
   LockPolicy lock_policy = LockPolicy::kRecovering;
   std::uint64_t unlocked_limit = 10'000;
@@ -38,6 +38,12 @@ struct DriveSupervisionConfig {
 /// When drives are asked for OP, helped back into it and stopped: SAFEOP to OP waits for the lock
 /// of the cycle; who left OP is acknowledged and asked again; a lock that does not come back stops
 /// all (LockPolicy). Frames and working counters are the MainDevice's own affair.
+///
+///     no lock within await_limit        stop, FailureKind::kNeverLocked
+///     not all in OP within op_limit     stop, kNeverOperational
+///     lock lost for unlocked_limit      stop, kSyncLost (kRecovering; kFatal: at once)
+///
+/// Without a law (`followed` false) the lock stops nothing; op_limit does.
 class DriveSupervision {
  public:
   /// `followed`: the cycle has a law, so that its lock means something.

@@ -53,7 +53,8 @@ class EpochGate {
  public:
   explicit EpochGate(const EpochRules& rules) noexcept : rules_(rules) {}
 
-  /// `ahead_of_utc`: what the reference's timescale is ahead of UTC by.
+  /// `ahead_of_utc`: what the reference's timescale is ahead of UTC by; 37 s for TAI since 2017. A
+  /// reading that is not plausible changes nothing: the next one is held against the same two.
   [[nodiscard]] EpochVerdict judge(ReferenceTime reference, Duration ahead_of_utc,
                                    const Witnesses& witnesses) noexcept;
   /// Of the last one that was not plausible: how far it was from the system clock (kTooEarly,

@@ -37,7 +37,7 @@ enum class NoteKind : std::uint8_t {
   kReferenceJumped,   ///< by jump; plan is what becomes of it
 };
 
-/// Fields that a kind does not name are zero.
+/// One decision. Fields that a kind does not name are zero.
 struct Note {
   NoteKind kind = NoteKind::kHoldover;
   double difference_ns = 0.0;

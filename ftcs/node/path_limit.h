@@ -20,8 +20,9 @@ class PathLimit {
   /// Zero: no limit.
   explicit constexpr PathLimit(Nanoseconds largest = Nanoseconds{0}) noexcept : largest_(largest) {}
 
-  /// The delay, where it is beyond the limit. `rate`: of the local clock in units of the
-  /// oscillator, good to `rate_doubt`.
+  /// The delay, where it is beyond the limit; the limit is widened by rate_doubt times the time
+  /// between the two messages, which the delay cannot be known better than. `rate`: of the local
+  /// clock in units of the oscillator, good to `rate_doubt`. Remembers the pair in any case.
   [[nodiscard]] constexpr std::optional<Duration> excess(const EventPair& pair, Rate rate,
                                                          double rate_doubt) noexcept {
     const bool forward = pair.direction == Direction::kForward;
@@ -34,6 +35,7 @@ class PathLimit {
     if (abs(delay) <= Duration{largest_} + doubt) return std::nullopt;
     return delay;
   }
+  /// A delay that was measured elsewhere (peer delay).
   [[nodiscard]] constexpr bool exceeds(Duration delay) const noexcept {
     return largest_ > Nanoseconds{0} && abs(delay) > Duration{largest_};
   }

@@ -11,7 +11,7 @@ namespace ftcs::node {
 class ReferenceGate {
  public:
   virtual ~ReferenceGate() = default;
-  /// `event`: the same instant on the free-running oscillator.
+  /// `event`: the same instant on the free-running oscillator. False: the message is dropped.
   [[nodiscard]] virtual bool admits(ReferenceTime reference, FreeRunningTime event) noexcept = 0;
   /// Whether the reference may advance by so much more than the oscillator, as far as that alone
   /// says.

@@ -81,6 +81,14 @@ struct UtcNote {
 ///
 /// Without I/O. After each input the notes are to be taken with next_note(); of one kind there is
 /// at most one in kQuiet.
+///
+///     UtcFollower utc({.epoch = {.earliest_utc_s = built_at}});
+///     utc.on_announced({.tai = true, .utc_offset = 37}, moment);       // each Announce
+///     if (utc.admits(reference, false, witnesses, now)) steer();       // each message
+///
+/// Sources: IEEE 1588-2019, 7.2 and 8.2.4 (timescale, currentUtcOffset, leap59, leap61); ITU-R
+/// TF.460 (when leap seconds happen). Instants are of UtcMoment::machine throughout, which must not
+/// run backward.
 class UtcFollower {
  public:
   static constexpr int kAnnouncements = 4;
@@ -96,7 +104,7 @@ class UtcFollower {
   void set_fixed(int utc_offset) noexcept;
   /// Each announcement once.
   void on_announced(const ReferenceScale& scale, const UtcMoment& moment) noexcept;
-  /// Once a second: lists speak, and leap seconds draw near.
+  /// Once a second: lists speak, and leap seconds draw near. Without it no leap second is expected.
   void on_time(const UtcMoment& moment) noexcept;
   /// The clock has leapt; local time, if it is TAI, went on.
   void on_leap_done(int leap) noexcept;
