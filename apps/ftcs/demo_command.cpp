@@ -186,11 +186,13 @@ int run_demo(const DemoOptions& demo, const DemoFiles& files) {
   if (demo.ptp) {
     if (const int code = run_ptp_demo(demo, result); code != kSuccess) return code;
   }
+  platform::LinuxKernel kernel;
   std::unique_ptr<daemon::EthercatDemo> ethercat;
   if (demo.ethercat && !result.interrupted) {
     // Four runs, which with the PTP half take less than three times its time.
     constexpr double kPartOfDuration = 0.3;
-    ethercat = daemon::run_ethercat_demo({demo.duration_s * kPartOfDuration, demo.live_view});
+    ethercat =
+        daemon::run_ethercat_demo(kernel, {demo.duration_s * kPartOfDuration, demo.live_view});
     if (ethercat == nullptr) return kRuntimeError;
     fmt::print("{}", daemon::ethercat_demo_text(*ethercat));
   }

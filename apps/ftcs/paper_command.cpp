@@ -104,7 +104,8 @@ int reproduce_section5(const PaperOptions& options) {
     result.two_machines = experiment::run_two_machines_table({}, options.machine_seeds, control);
   }
   if (options.live && !interrupt.flag()) {
-    auto live = daemon::run_live_contours([&interrupt] { return interrupt.flag().load(); });
+    platform::LinuxKernel kernel;
+    auto live = daemon::run_live_contours(kernel, [&interrupt] { return interrupt.flag().load(); });
     if (!live) return kRuntimeError;
     result.live_contour = std::move(*live);
   }

@@ -84,11 +84,11 @@ class ClockWatch {
     auto device = open(platform::ClockAccess::kRead);
     if (!device) return;
     name_ = device->name();
-    thread_ = std::thread([this, clock = std::move(*device)]() mutable {
-      constexpr std::chrono::milliseconds kTurn{100};
+    thread_ = std::thread([this, &kernel, clock = std::move(*device)]() mutable {
+      constexpr std::int64_t kTurn_ns = 100'000'000;
       auto last = clock.rate();
       while (!stop_) {
-        std::this_thread::sleep_for(kTurn);
+        kernel.sleep_until(kernel.clock_ns(CLOCK_MONOTONIC) + kTurn_ns);
         const auto now = clock.rate();
         if (last && now && now->ratio() != last->ratio()) ++changes_;
         last = now;

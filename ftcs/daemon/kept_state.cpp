@@ -31,11 +31,8 @@ constexpr std::int64_t kLatest_s = 253'402'300'799;
 /// Nobody writes more; a file that is larger is something else.
 constexpr std::size_t kLargestFile = 65'536;
 
-std::int64_t now_s() {
-  using std::chrono::system_clock;
-  return std::chrono::duration_cast<std::chrono::seconds>(system_clock::now().time_since_epoch())
-      .count();
-}
+/// The date that the file carries.
+std::int64_t now_s(const Log& log) { return log.kernel().clock_ns(CLOCK_REALTIME) / 1'000'000'000; }
 
 Result<LearntState, std::string> from_json(const Json& json, std::string_view clock,
                                            std::int64_t now) {
@@ -98,7 +95,7 @@ StateKeeper::StateKeeper(Log& log, std::string path, Duration interval, std::str
   std::string text(kLargestFile, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(file.gcount()));
-  const auto state = read_kept_state(text, clock_, now_s());
+  const auto state = read_kept_state(text, clock_, now_s(log_));
   if (!state) {
     log_(LogLevel::kWarning, "driftfile {}: not used, {}", path_, state.error());
     return;
@@ -116,13 +113,13 @@ void StateKeeper::note(const ServoSnapshot& snapshot, FreeRunningTime now) {
   if (!latest_ || !take_result(false)) return;  // a disk that is slow, or stalled: next time
   saved_ = now;
   writing_ = std::async(std::launch::async, platform::write_durably, path_,
-                        to_text({clock_, now_s(), *latest_}), platform::Readers::kOwner);
+                        to_text({clock_, now_s(log_), *latest_}), platform::Readers::kOwner);
 }
 
 void StateKeeper::save() {
   (void)take_result(true);
   if (path_.empty() || !latest_) return;
-  report(platform::write_durably(path_, to_text({clock_, now_s(), *latest_})));
+  report(platform::write_durably(path_, to_text({clock_, now_s(log_), *latest_})));
 }
 
 bool StateKeeper::take_result(bool wait) {

@@ -37,6 +37,8 @@ class Log {
     if (!admits(level, fmt::string_view(format).data())) return;
     write(level, fmt::format(format, std::forward<Arguments>(arguments)...));
   }
+  /// Who tells it the time.
+  [[nodiscard]] platform::Kernel& kernel() const noexcept { return kernel_; }
   /// Once per turn of a loop: writes what a reader was not ready for.
   void flush();
 

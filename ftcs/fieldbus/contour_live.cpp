@@ -48,7 +48,7 @@ RunOptions options_for(const Way& way, std::uint16_t port) {
 }  // namespace
 
 std::optional<std::vector<experiment::ContourRow>> run_live_contours(
-    const std::function<bool()>& stop) {
+    platform::Kernel& kernel, const std::function<bool()>& stop) {
   std::vector<experiment::ContourRow> rows;
   SegmentOptions segment_options;
   segment_options.drives = kDrives;
@@ -56,13 +56,13 @@ std::optional<std::vector<experiment::ContourRow>> run_live_contours(
   for (const Way way : {Way{"no sync", "none"}, Way{"PICS", "pics"}, Way{"FTCS", "ftcs"},
                         Way{"adaptive", "adaptive"}}) {
     if (stop()) break;
-    auto segment = LocalSegment::start(segment_options, kSegmentPriority);
+    auto segment = LocalSegment::start(kernel, segment_options, kSegmentPriority);
     if (!segment) {
       fmt::print(stderr, "ftcs paper: {}\n", segment.error().message());
       return std::nullopt;
     }
     const RunOptions options = options_for(way, (*segment)->port());
-    auto link = platform::EthercatLink::connect_udp(options.host, options.port);
+    auto link = platform::EthercatLink::connect_udp(kernel, options.host, options.port);
     if (!link) {
       fmt::print(stderr, "ftcs paper: {}\n", link.error().message());
       return std::nullopt;

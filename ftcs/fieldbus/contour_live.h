@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ftcs/experiment/contour_experiment.h"
+#include "ftcs/platform/kernel.h"
 
 namespace ftcs::daemon {
 
@@ -13,6 +14,6 @@ namespace ftcs::daemon {
 /// MainDevice in this process, one run for each way to keep the cycle. Says on standard error what
 /// went wrong, and returns nothing then.
 [[nodiscard]] std::optional<std::vector<experiment::ContourRow>> run_live_contours(
-    const std::function<bool()>& stop);
+    platform::Kernel& kernel, const std::function<bool()>& stop);
 
 }  // namespace ftcs::daemon

@@ -57,11 +57,12 @@ std::vector<const MainRunner*> EthercatDemo::views() const {
   return result;
 }
 
-std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& options) {
+std::unique_ptr<EthercatDemo> run_ethercat_demo(platform::Kernel& kernel,
+                                                const EthercatDemoOptions& options) {
   auto demo = std::make_unique<EthercatDemo>();
   SegmentOptions segment;
   segment.drives = kDrives;
-  auto started = LocalSegment::start(segment, kSegmentPriority);
+  auto started = LocalSegment::start(kernel, segment, kSegmentPriority);
   if (!started) {
     fmt::print(stderr, "ftcs demo: {}\n", started.error().message());
     return nullptr;
@@ -73,7 +74,7 @@ std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& optio
     if (stop()) break;
     RunOptions run = run_options(options, demo->segment->port());
     set_cycle_law(run, servo);
-    auto link = platform::EthercatLink::connect_udp(run.host, run.port);
+    auto link = platform::EthercatLink::connect_udp(kernel, run.host, run.port);
     if (!link) {
       fmt::print(stderr, "ftcs demo: {}\n", link.error().message());
       return nullptr;

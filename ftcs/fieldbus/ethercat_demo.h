@@ -28,7 +28,8 @@ struct EthercatDemo {
 };
 
 /// Says on standard error what went wrong, and returns nothing then.
-[[nodiscard]] std::unique_ptr<EthercatDemo> run_ethercat_demo(const EthercatDemoOptions& options);
+[[nodiscard]] std::unique_ptr<EthercatDemo> run_ethercat_demo(platform::Kernel& kernel,
+                                                              const EthercatDemoOptions& options);
 [[nodiscard]] std::string ethercat_demo_text(const EthercatDemo& demo);
 [[nodiscard]] Json ethercat_demo_json(const EthercatDemo& demo);
 

@@ -19,9 +19,11 @@ namespace ftcs::daemon {
 
 namespace {
 
-Result<platform::EthercatLink, platform::OsError> open_link(const RunOptions& options) {
-  return options.interface.empty() ? platform::EthercatLink::connect_udp(options.host, options.port)
-                                   : platform::EthercatLink::open_raw(options.interface);
+Result<platform::EthercatLink, platform::OsError> open_link(platform::Kernel& kernel,
+                                                            const RunOptions& options) {
+  return options.interface.empty()
+             ? platform::EthercatLink::connect_udp(kernel, options.host, options.port)
+             : platform::EthercatLink::open_raw(kernel, options.interface);
 }
 
 /// One MainDevice a wire: what is held against a second one on this host.
@@ -65,7 +67,7 @@ int with_runner(platform::Kernel& kernel, const RunOptions& options, Body body) 
                     kRuntimeError);
   }
   const platform::Descriptor hold(kernel, held);
-  auto link = open_link(options);
+  auto link = open_link(kernel, options);
   if (!link) return end_with(link.error().message(), kRuntimeError);
   const platform::StopFlag stop_flag;
   const auto runner = std::make_unique<MainRunner>(options, std::move(*link));

@@ -15,6 +15,7 @@ namespace ftcs::daemon {
 /// the wire is CLOCK_MONOTONIC.
 class HostOtherSide final : public ethercat::OtherSide {
  public:
+  explicit HostOtherSide(platform::Kernel& kernel) noexcept : kernel_(kernel) {}
   [[nodiscard]] std::optional<std::uint64_t> system_time(
       ethercat::WireTime instant) noexcept override {
     constexpr std::int64_t kTick_ns = 10;
@@ -25,7 +26,7 @@ class HostOtherSide final : public ethercat::OtherSide {
   }
 
  private:
-  platform::LinuxKernel kernel_;
+  platform::Kernel& kernel_;
 };
 
 }  // namespace ftcs::daemon

@@ -11,17 +11,17 @@
 namespace ftcs::daemon {
 
 /// A segment of modelled drives in a thread of this process, on loopback by the UDP encapsulation:
-/// no root, no second program.
+/// no root, no second program. The kernel must outlive it.
 class LocalSegment {
  public:
   /// SCHED_FIFO at `priority` for its thread, if the system grants it.
   [[nodiscard]] static Result<std::unique_ptr<LocalSegment>, platform::OsError> start(
-      const SegmentOptions& options, int priority) {
-    auto link = platform::EthercatLink::listen_udp(options.address, 0);
+      platform::Kernel& kernel, const SegmentOptions& options, int priority) {
+    auto link = platform::EthercatLink::listen_udp(kernel, options.address, 0);
     if (!link) return link.error();
     const std::uint16_t port = link->port();
     return std::unique_ptr<LocalSegment>(
-        new LocalSegment(options, std::move(*link), port, priority));
+        new LocalSegment(kernel, options, std::move(*link), port, priority));
   }
   ~LocalSegment() { stop(); }
   LocalSegment(const LocalSegment&) = delete;
@@ -36,9 +36,9 @@ class LocalSegment {
   [[nodiscard]] const SegmentServer& server() const noexcept { return server_; }
 
  private:
-  LocalSegment(const SegmentOptions& options, platform::EthercatLink link, std::uint16_t port,
-               int priority)
-      : port_(port), server_(options, std::move(link)), thread_([this, priority] {
+  LocalSegment(platform::Kernel& kernel, const SegmentOptions& options, platform::EthercatLink link,
+               std::uint16_t port, int priority)
+      : port_(port), server_(kernel, options, std::move(link)), thread_([this, priority] {
           static_cast<void>(platform::make_realtime(priority, -1));
           server_.run([this] { return stop_.load(); });
         }) {}

@@ -11,8 +11,6 @@ namespace ftcs::daemon {
 
 namespace {
 
-using platform::HostClock;
-
 /// A frame of the bring-up that is not back by then is lost.
 constexpr Nanoseconds kReplyTimeout{5'000'000};
 /// A segment in software may have to wait for its processor: half a second until nobody answers.
@@ -79,7 +77,7 @@ MainRunner::MainRunner(const RunOptions& options, platform::EthercatLink link)
       observer_(options) {}
 
 bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) {
-  stamps_.sent = stamps_.received = HostClock::now();
+  stamps_.sent = stamps_.received = now();
   if (frame.empty()) return false;
   const int error = link_.send(frame);
   // Plant time of the first reading: the stamp of the card comes later, and is some microseconds
@@ -102,21 +100,21 @@ bool MainRunner::transfer(ethercat::ConstBytes frame, FreeRunningTime deadline) 
 
 void MainRunner::exchange() {
   const ethercat::ConstBytes frame = node_->next_frame();
-  if (!transfer(frame, HostClock::now() + Duration{kReplyTimeout})) node_->on_timeout();
+  if (!transfer(frame, now() + Duration{kReplyTimeout})) node_->on_timeout();
 }
 
 std::optional<std::string> MainRunner::await_plant_time(const std::function<bool()>& stop) {
   constexpr Nanoseconds kLook{10'000'000};
   const Duration patience{plant_time_patience(options_)};
-  const FreeRunningTime start = HostClock::now();
-  while (plant_ && !plant_->at(HostClock::now())) {
+  const FreeRunningTime start = now();
+  while (plant_ && !plant_->at(now())) {
     if (stop()) return "stopped by a signal before plant time was known";
-    if (HostClock::now() - start > patience) {
+    if (now() - start > patience) {
       const std::string reason = plant_->reason();
       return fmt::format("--plant-time {}: not known after {:g} s{}{}", plant_->name(),
                          patience.seconds(), reason.empty() ? "" : ": ", reason);
     }
-    HostClock::wait_until(HostClock::now() + Duration{kLook}, Nanoseconds{0});
+    link_.clock().wait_until(now() + Duration{kLook}, Nanoseconds{0});
   }
   return std::nullopt;
 }
@@ -138,13 +136,13 @@ bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
 
 void MainRunner::run(const std::function<bool()>& stop) {
   csv_.begin();
-  const FreeRunningTime start = HostClock::now();
+  const FreeRunningTime start = now();
   watch_.reserve(*node_, start);
   next_line_ = start + Duration{kLineInterval};
-  node_->start(HostClock::now());
+  node_->start(now());
   try {
     while (!stop() && node_->cyclic()) {
-      const double elapsed_s = (HostClock::now() - start).seconds();
+      const double elapsed_s = (now() - start).seconds();
       if (options_.duration_s > 0.0 && elapsed_s > options_.duration_s) break;
       cycle();
     }
@@ -163,23 +161,22 @@ void MainRunner::stop_drives() {
 }
 
 void MainRunner::cycle() {
-  HostClock::wait_until(decision().wake, options_.spin);
+  link_.clock().wait_until(decision().wake, options_.spin);
   const auto limit =
       static_cast<std::int64_t>(kReplyShare * static_cast<double>(options_.servo.cycle.count()));
-  const FreeRunningTime woken = HostClock::now();
-  const bool answered = transfer(node_->begin_cycle(woken, plant_now(woken)),
-                                 HostClock::now() + Duration::from_whole_ns(limit));
-  node_->end_cycle(answered, stamps_, HostClock::now());
-  watch_.note(*node_, HostClock::now());
-  observer_.note(*node_, figures(), HostClock::now());
-  service_.turn(HostClock::now(), decision().state == CycleState::kLocked,
+  const FreeRunningTime woken = now();
+  const bool answered =
+      transfer(node_->begin_cycle(woken, plant_now(woken)), now() + Duration::from_whole_ns(limit));
+  node_->end_cycle(answered, stamps_, now());
+  watch_.note(*node_, now());
+  observer_.note(*node_, figures(), now());
+  service_.turn(now(), decision().state == CycleState::kLocked,
                 [this] { return service_sentence(); });
   if (csv_.is_open()) {
     csv_.write(figures().cycles, *node_);
   }
-  if (HostClock::now() >= next_line_) {
+  if (now() >= next_line_) {
     next_line_ = next_line_ + Duration{kLineInterval};
-    link_.refresh_clock();
     if (status_ != nullptr) {
       status_->publish(RunSnapshot::of(*node_, observer_.seen(*node_, figures())));
     }

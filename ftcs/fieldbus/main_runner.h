@@ -23,7 +23,8 @@ namespace ftcs::daemon {
 /// What the node is told for these options.
 [[nodiscard]] node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only);
 
-/// Runs a CycleNode over a link: sleeps, sends, receives, writes figures and lines.
+/// Runs a CycleNode over a link: sleeps, sends, receives, writes figures and lines. What time it is
+/// the link's kernel says.
 class MainRunner {
  public:
   MainRunner(const RunOptions& options, platform::EthercatLink link);
@@ -67,6 +68,8 @@ class MainRunner {
   void cycle();
   void stop_drives();
   void print_live() const;
+  /// Of the clock that the link's stamps are of.
+  [[nodiscard]] FreeRunningTime now() const noexcept { return link_.clock().now(); }
   [[nodiscard]] std::optional<ReferenceTime> plant_now(FreeRunningTime now);
   [[nodiscard]] std::string_view service_sentence();
 

@@ -21,7 +21,7 @@ class OnLoopback : public ::testing::TestWithParam<std::string> {
   void start() {
     SegmentOptions segment;
     segment.drives = 2;
-    auto started = LocalSegment::start(segment, 0);
+    auto started = LocalSegment::start(kernel_, segment, 0);
     ASSERT_TRUE(started);
     segment_ = std::move(*started);
     RunOptions options;
@@ -35,12 +35,13 @@ class OnLoopback : public ::testing::TestWithParam<std::string> {
     options.servo.cycle = Nanoseconds{2'000'000};
     options.servo.largest_lateness = options.servo.largest_round_trip = Nanoseconds{0};
     set_cycle_law(options, GetParam());
-    auto link = platform::EthercatLink::connect_udp(options.host, options.port);
+    auto link = platform::EthercatLink::connect_udp(kernel_, options.host, options.port);
     ASSERT_TRUE(link);
     runner_ = std::make_unique<MainRunner>(options, std::move(*link));
     ASSERT_TRUE(runner_->bring_up([] { return false; }, false))
         << describe(runner_->main().failure());
   }
+  platform::LinuxKernel kernel_;
   std::unique_ptr<LocalSegment> segment_;
   std::unique_ptr<MainRunner> runner_;
 };

@@ -51,11 +51,13 @@ Json faults_json(const ethercat::DriveApplication& drive) {
 
 }  // namespace
 
-SegmentServer::SegmentServer(const SegmentOptions& options, platform::EthercatLink link)
+SegmentServer::SegmentServer(platform::Kernel& kernel, const SegmentOptions& options,
+                             platform::EthercatLink link)
     : options_(options),
       link_(std::move(link)),
+      other_side_(kernel),
       segment_(std::make_unique<ethercat::Segment>()),
-      start_(platform::HostClock::now()),
+      start_(link_.clock().now()),
       random_(options.seed) {
   std::stable_sort(options_.faults.begin(), options_.faults.end(),
                    [](const SegmentFault& a, const SegmentFault& b) { return a.at_s < b.at_s; });
@@ -95,14 +97,13 @@ ethercat::SubDeviceConfig SegmentServer::config_of(std::size_t n) {
 
 bool SegmentServer::finished() const {
   if (options_.duration_s <= 0.0) return false;
-  return (platform::HostClock::now() - start_).seconds() > options_.duration_s;
+  return (link_.clock().now() - start_).seconds() > options_.duration_s;
 }
 
 void SegmentServer::serve() {
-  const auto received = link_.receive(platform::HostClock::now() + Duration{kIdle}, false);
+  const auto received = link_.receive(link_.clock().now() + Duration{kIdle}, false);
   if (!received) {
-    segment_->advance(on_wire(platform::HostClock::now()));
-    link_.refresh_clock();
+    segment_->advance(on_wire(link_.clock().now()));
     return;
   }
   const auto frame = ethercat::FrameView::parse(received->frame);

@@ -52,7 +52,9 @@ struct SegmentOptions {
 /// Serves a segment of modelled drives on a link until it is told to stop.
 class SegmentServer {
  public:
-  SegmentServer(const SegmentOptions& options, platform::EthercatLink link);
+  /// The kernel must outlive the server.
+  SegmentServer(platform::Kernel& kernel, const SegmentOptions& options,
+                platform::EthercatLink link);
   /// Returns when `stop` says so or the time is up.
   template <class Stop>
   void run(const Stop& stop) {

@@ -1,55 +1,45 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/host_clock.h"
 
+#include <cstdlib>
 #include <ctime>
 #include <fcntl.h>
-#include <limits>
 #include <sched.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 namespace ftcs::platform {
 
-namespace {
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-
-std::int64_t read_ns(clockid_t clock) noexcept {
-  timespec time{};
-  clock_gettime(clock, &time);
-  return static_cast<std::int64_t>(time.tv_sec) * kNsPerSecond + time.tv_nsec;
+FreeRunningTime HostClock::now() const noexcept {
+  return FreeRunningTime::from_ns(kernel_->clock_ns(CLOCK_MONOTONIC));
 }
-}  // namespace
 
-FreeRunningTime HostClock::now() noexcept {
-  return FreeRunningTime::from_ns(read_ns(CLOCK_MONOTONIC));
+HostClock::Bracket HostClock::read() const noexcept {
+  const std::int64_t before = kernel_->clock_ns(CLOCK_MONOTONIC);
+  const std::int64_t realtime = kernel_->clock_ns(CLOCK_REALTIME);
+  const std::int64_t width = kernel_->clock_ns(CLOCK_MONOTONIC) - before;
+  return {realtime - (before + width / 2), width};
 }
 
 void HostClock::refresh() noexcept {
   constexpr int kReadings = 7;
-  std::int64_t best_width = std::numeric_limits<std::int64_t>::max();
-  std::int64_t best = realtime_ahead_ns_;
-  for (int i = 0; i < kReadings; ++i) {
-    const std::int64_t before = read_ns(CLOCK_MONOTONIC);
-    const std::int64_t realtime = read_ns(CLOCK_REALTIME);
-    const std::int64_t width = read_ns(CLOCK_MONOTONIC) - before;
-    if (width >= best_width) continue;
-    best_width = width;
-    best = realtime - (before + width / 2);
+  Bracket best = read();
+  for (int i = 1; i < kReadings; ++i) {
+    const Bracket next = read();
+    if (next.width_ns < best.width_ns) best = next;
   }
-  // The difference is constant but for steps: small changes are the brackets' own width.
-  constexpr std::int64_t kStep = 1000;
-  const std::int64_t change = best - realtime_ahead_ns_;
-  if (known_ && change < kStep && change > -kStep) return;
-  realtime_ahead_ns_ = best;
-  known_ = true;
+  realtime_ahead_ns_ = best.ahead_ns;
 }
 
-void HostClock::wait_until(FreeRunningTime instant, Nanoseconds spin) noexcept {
+void HostClock::follow_steps() noexcept {
+  constexpr std::int64_t kStep = 1000;  // smaller ones are the brackets' own width
+  const Bracket now = read();
+  if (std::abs(now.ahead_ns - realtime_ahead_ns_) > kStep + now.width_ns / 2) refresh();
+}
+
+void HostClock::wait_until(FreeRunningTime instant, Nanoseconds spin) const noexcept {
   const std::int64_t until = (instant - Duration{spin}).since_epoch().floor_ns();
-  const timespec time{.tv_sec = until / kNsPerSecond, .tv_nsec = until % kNsPerSecond};
-  if (read_ns(CLOCK_MONOTONIC) < until) {
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
-  }
+  if (kernel_->clock_ns(CLOCK_MONOTONIC) < until) kernel_->sleep_until(until);
   while (spin > Nanoseconds{0} && now() < instant) {
   }
 }

@@ -23,6 +23,10 @@ Number or_errno(Number result) noexcept {
   return result < 0 ? static_cast<Number>(-errno) : result;
 }
 
+timespec to_timespec(std::int64_t ns) noexcept {
+  return {.tv_sec = ns / kNanosecondsPerSecond, .tv_nsec = ns % kNanosecondsPerSecond};
+}
+
 }  // namespace
 
 std::int64_t LinuxKernel::clock_ns(clockid_t clock) noexcept {
@@ -39,6 +43,17 @@ int LinuxKernel::bind(int fd, const SocketAddress& address) noexcept {
   return or_errno(::bind(fd, address.get(), address.size()));
 }
 
+int LinuxKernel::connect(int fd, const SocketAddress& address) noexcept {
+  return or_errno(::connect(fd, address.get(), address.size()));
+}
+
+std::uint16_t LinuxKernel::port_of(int fd) noexcept {
+  sockaddr_storage storage{};
+  socklen_t size = sizeof storage;
+  if (::getsockname(fd, reinterpret_cast<sockaddr*>(&storage), &size) != 0) return 0;
+  return SocketAddress::from(storage).port();
+}
+
 int LinuxKernel::set_option(int fd, int level, int name, const void* value,
                             socklen_t size) noexcept {
   return or_errno(::setsockopt(fd, level, name, value, size));
@@ -51,7 +66,8 @@ int LinuxKernel::set_nonblocking(int fd) noexcept {
 
 ssize_t LinuxKernel::send_to(int fd, std::span<const std::uint8_t> bytes,
                              const SocketAddress& to) noexcept {
-  return or_errno(::sendto(fd, bytes.data(), bytes.size(), 0, to.get(), to.size()));
+  const sockaddr* const where = to.size() > 0 ? to.get() : nullptr;
+  return or_errno(::sendto(fd, bytes.data(), bytes.size(), 0, where, to.size()));
 }
 
 ssize_t LinuxKernel::receive(int fd, msghdr& message, int flags) noexcept {
@@ -71,6 +87,17 @@ int LinuxKernel::poll(std::span<pollfd> descriptors, int timeout_ms) noexcept {
   return or_errno(::poll(descriptors.data(), descriptors.size(), timeout_ms));
 }
 
+int LinuxKernel::wait_readable(int fd, std::int64_t timeout_ns) noexcept {
+  const timespec timeout = to_timespec(std::max<std::int64_t>(timeout_ns, 0));
+  pollfd entry{.fd = fd, .events = POLLIN, .revents = 0};
+  return or_errno(::ppoll(&entry, 1, &timeout, nullptr));
+}
+
+void LinuxKernel::sleep_until(std::int64_t instant_ns) noexcept {
+  const timespec instant = to_timespec(instant_ns);
+  ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &instant, nullptr);
+}
+
 void LinuxKernel::close(int fd) noexcept { ::close(fd); }
 
 ssize_t LinuxKernel::read(int fd, std::span<std::uint8_t> bytes) noexcept {
@@ -86,9 +113,8 @@ int LinuxKernel::open_timer() noexcept {
 }
 
 int LinuxKernel::set_timer(int fd, std::int64_t from_now_ns) noexcept {
-  const std::int64_t ns = std::max<std::int64_t>(from_now_ns, 1);  // zero would disarm it
   itimerspec when{};
-  when.it_value = {.tv_sec = ns / kNanosecondsPerSecond, .tv_nsec = ns % kNanosecondsPerSecond};
+  when.it_value = to_timespec(std::max<std::int64_t>(from_now_ns, 1));  // zero would disarm it
   return or_errno(::timerfd_settime(fd, 0, &when, nullptr));
 }
 

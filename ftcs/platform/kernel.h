@@ -15,11 +15,13 @@ namespace ftcs::platform {
 
 /// The system calls behind clocks, timestamps and the network, so that a test can let each of them
 /// fail. Management sockets, processes and files of ours (local_socket.h, child_process.h,
-/// durable_file.h) call the system themselves and are tested with the real one.
+/// durable_file.h) call the system themselves and are tested with the real one; none of them asks
+/// for the time.
 ///
-/// A negative result is -errno. The set is kept to what a network simulator that replaces libc's
-/// calls offers too: poll, plain datagram sockets, ioctl; no threads, netlink, epoll or signalfd.
-/// (Packet sockets, which no such simulator knows, are datagram sockets here too.)
+/// A negative result is -errno. For PTP the set is kept to what a network simulator that replaces
+/// libc's calls offers too: poll, plain datagram sockets, ioctl; no threads, netlink, epoll or
+/// signalfd. (Packet sockets, which no such simulator knows, are datagram sockets here too.) A
+/// cyclic task asks for what poll's milliseconds are too coarse for: sleep_until, wait_readable.
 class Kernel {
  public:
   virtual ~Kernel() = default;
@@ -29,15 +31,25 @@ class Kernel {
   [[nodiscard]] virtual std::int64_t clock_ns(clockid_t clock) noexcept = 0;
   [[nodiscard]] virtual int socket(int domain, int type) noexcept = 0;
   [[nodiscard]] virtual int bind(int fd, const SocketAddress& address) noexcept = 0;
+  /// Of a datagram socket: where its messages go, and whose it takes from now on.
+  [[nodiscard]] virtual int connect(int fd, const SocketAddress& address) noexcept = 0;
+  /// The UDP port that the socket is bound to, in host order; 0: none.
+  [[nodiscard]] virtual std::uint16_t port_of(int fd) noexcept = 0;
   [[nodiscard]] virtual int set_option(int fd, int level, int name, const void* value,
                                        socklen_t size) noexcept = 0;
   [[nodiscard]] virtual int set_nonblocking(int fd) noexcept = 0;
+  /// An empty `to`: where the socket is connected or bound to.
   [[nodiscard]] virtual ssize_t send_to(int fd, std::span<const std::uint8_t> bytes,
                                         const SocketAddress& to) noexcept = 0;
   [[nodiscard]] virtual ssize_t receive(int fd, msghdr& message, int flags) noexcept = 0;
   [[nodiscard]] virtual int control(int fd, unsigned long request, void* argument) noexcept = 0;
   [[nodiscard]] virtual int open(const char* path, int flags) noexcept = 0;
   [[nodiscard]] virtual int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept = 0;
+  /// Until the descriptor is readable or in error, `timeout_ns` at most. Positive: it is; 0: the
+  /// time is over.
+  [[nodiscard]] virtual int wait_readable(int fd, std::int64_t timeout_ns) noexcept = 0;
+  /// Returns when CLOCK_MONOTONIC shows `instant_ns`, or earlier because of a signal.
+  virtual void sleep_until(std::int64_t instant_ns) noexcept = 0;
   virtual void close(int fd) noexcept = 0;
   [[nodiscard]] virtual ssize_t read(int fd, std::span<std::uint8_t> bytes) noexcept = 0;
   /// clock_adjtime(2): with modes 0 only asks. Fills `request` with what the kernel then holds;
@@ -68,6 +80,8 @@ class LinuxKernel final : public Kernel {
   [[nodiscard]] std::int64_t clock_ns(clockid_t clock) noexcept override;
   [[nodiscard]] int socket(int domain, int type) noexcept override;
   [[nodiscard]] int bind(int fd, const SocketAddress& address) noexcept override;
+  [[nodiscard]] int connect(int fd, const SocketAddress& address) noexcept override;
+  [[nodiscard]] std::uint16_t port_of(int fd) noexcept override;
   [[nodiscard]] int set_option(int fd, int level, int name, const void* value,
                                socklen_t size) noexcept override;
   [[nodiscard]] int set_nonblocking(int fd) noexcept override;
@@ -77,6 +91,8 @@ class LinuxKernel final : public Kernel {
   [[nodiscard]] int control(int fd, unsigned long request, void* argument) noexcept override;
   [[nodiscard]] int open(const char* path, int flags) noexcept override;
   [[nodiscard]] int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override;
+  [[nodiscard]] int wait_readable(int fd, std::int64_t timeout_ns) noexcept override;
+  void sleep_until(std::int64_t instant_ns) noexcept override;
   void close(int fd) noexcept override;
   [[nodiscard]] ssize_t read(int fd, std::span<std::uint8_t> bytes) noexcept override;
   [[nodiscard]] int adjust_clock(clockid_t clock, timex& request) noexcept override;

@@ -83,7 +83,8 @@ class FakeKernel : public Kernel {
     return clock == CLOCK_REALTIME ? realtime_ns : raw_ns;
   }
   int socket(int family, int type) noexcept override {
-    if (type != SOCK_DGRAM) return -EINVAL;
+    const int kind = type & ~(SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (kind != SOCK_DGRAM && (kind != SOCK_RAW || family != AF_PACKET)) return -EINVAL;
     if (family == AF_PACKET && packet_socket_errno != 0) return -packet_socket_errno;
     sockets[next_descriptor_] = {};
     sockets[next_descriptor_].family = family;
@@ -94,6 +95,11 @@ class FakeKernel : public Kernel {
     sockets[fd].port = address.port();
     return 0;
   }
+  int connect(int fd, const SocketAddress& address) noexcept override {
+    sockets[fd].port = address.port();
+    return 0;
+  }
+  std::uint16_t port_of(int fd) noexcept override { return sockets[fd].port; }
   int set_option(int fd, int level, int name, const void* value, socklen_t size) noexcept override {
     if (level == SOL_SOCKET && name == SO_TIMESTAMPING && timestamping_errno != 0) {
       return -timestamping_errno;
@@ -194,6 +200,15 @@ class FakeKernel : public Kernel {
     }
     if (ready == 0) advance(std::int64_t{timeout_ms} * 1'000'000);
     return ready;
+  }
+  int wait_readable(int fd, std::int64_t timeout_ns) noexcept override {
+    const Socket& socket = sockets[fd];
+    const bool ready = !socket.received.empty() || !socket.error_queue.empty();
+    if (!ready) advance(timeout_ns);
+    return ready ? 1 : 0;
+  }
+  void sleep_until(std::int64_t instant_ns) noexcept override {
+    advance(std::max<std::int64_t>(instant_ns - raw_ns, 0));
   }
   void close(int fd) noexcept override { sockets.erase(fd); }
   // Clocks are steered in fake_clocks.h.

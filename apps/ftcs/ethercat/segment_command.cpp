@@ -109,9 +109,10 @@ int run_segment(SegmentArguments arguments) {
   }
   const daemon::SegmentOptions& options = arguments.options;
   if (!can_write_results({options.json})) return kRuntimeError;
+  platform::LinuxKernel kernel;
   auto link = options.interface.empty()
-                  ? platform::EthercatLink::listen_udp(options.address, options.port)
-                  : platform::EthercatLink::open_raw(options.interface);
+                  ? platform::EthercatLink::listen_udp(kernel, options.address, options.port)
+                  : platform::EthercatLink::open_raw(kernel, options.interface);
   if (!link) {
     fmt::print(stderr, "ftcs ethercat-segment: {}\n", link.error().message());
     return kRuntimeError;
@@ -125,7 +126,7 @@ int run_segment(SegmentArguments arguments) {
     fmt::print(stderr, "ftcs ethercat-segment: {}\n", *wrong);
     return kRuntimeError;
   }
-  daemon::SegmentServer server(options, std::move(*link));
+  daemon::SegmentServer server(kernel, options, std::move(*link));
   fmt::print("{} drives in a {} on {}\n", options.drives, arguments.topology,
              options.interface.empty() ? fmt::format("UDP {}:{}", options.address, options.port)
                                        : options.interface);
