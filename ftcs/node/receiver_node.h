@@ -50,7 +50,7 @@ using ReceiverEvent = std::variant<ptp::Action, Steered, Note>;
 ///
 /// IEEE 1588-2019: an ordinary clock that only receives, one port; corrections and asymmetry as
 /// 11.6 has them, 11.3 or 11.4 for the delay, 9.2.5 for the port's state, in which SLAVE means that
-/// the servo is locked. What the standard leaves open: docs/spec-notes/ptp.md.
+/// the servo is locked. What the standard leaves open: docs/spec-notes/ieee1588.md.
 ///
 /// One thread owns node, clock and gate. The octets are read during the call alone. Nothing waits,
 /// nothing is allocated; one input makes a bounded number of events.

@@ -17,6 +17,7 @@ namespace ftcs::ptp {
 /// UDP ports 319 and 320 (Annexes C and D). Event messages need a transmit stamp.
 enum class Channel : std::uint8_t { kEvent, kGeneral };
 
+/// Where to: the shell knows the addresses, the core does not.
 enum class Destination : std::uint8_t {
   kMulticast,    ///< everybody: 224.0.1.129, ff0X::181, 01-1B-19-00-00-00 (Annexes C to E)
   kNeighbour,    ///< peer delay messages: 224.0.0.107, ff02::6b, 01-80-C2-00-00-0E
@@ -61,6 +62,7 @@ struct EmitPeerDelay {
   std::optional<PeerStamps> stamps{};
 };
 
+/// For the log, and for whoever shows the port's state; already done.
 struct PortStateChanged {
   PortState from = PortState::kInitializing;
   PortState to = PortState::kInitializing;
@@ -99,6 +101,8 @@ struct ReferenceJumped {
   Duration jump{};
 };
 
+/// One thing to be done (SendMessage), to be given to measurement and servo (EmitPair,
+/// EmitPeerDelay), or to be told (the others).
 using Action =
     std::variant<SendMessage, EmitPair, EmitPeerDelay, SenderIsTransmitter, PortStateChanged,
                  TransmitterSeen, TransmitterSelected, TransmitterDoubted, ReferenceJumped>;

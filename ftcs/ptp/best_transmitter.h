@@ -24,7 +24,11 @@ class ForeignTransmitters {
   /// 9.3.2.4.3 asks for at least five.
   static constexpr std::size_t kCapacity = 8;
 
-  enum class Heard : std::uint8_t { kNew, kKnown, kTableFull };
+  enum class Heard : std::uint8_t {
+    kNew,
+    kKnown,
+    kTableFull  ///< ignored: all places are taken by transmitters that still announce
+  };
 
   /// An Announce arrived. A newcomer may take the place of a transmitter that has fallen silent,
   /// but not that of `selected`: when its silence ends it is for the receipt timeout to say.

@@ -21,6 +21,8 @@ class DelayRequests {
  public:
   static constexpr std::int8_t kLongestDemandedLogInterval = 5;
 
+  /// `log_interval`: logMinDelayReqInterval, log2 of seconds, -7 to 7; outside, one second. `seed`:
+  /// of the random intervals; two receivers with one seed ask at the same moments.
   DelayRequests(std::int8_t log_interval, std::uint64_t seed) noexcept;
 
   /// The first request is due at once, unless one was for that reason within the last interval;
@@ -35,6 +37,7 @@ class DelayRequests {
 
   /// The sequence id of a request that is due, which must now be sent; none if it is not time yet.
   std::optional<std::uint16_t> begin_if_due(FreeRunningTime now, Counters& counters) noexcept;
+  /// t3. A pair, if the answer was there already.
   std::optional<EventPair> on_sent(std::uint16_t sequence_id, FreeRunningTime sent,
                                    Counters& counters) noexcept;
   /// The stamp is overdue, which is counted; one that comes later is used all the same.
@@ -43,6 +46,7 @@ class DelayRequests {
   /// (7.7.2.4, 13.3.2.14); more than kLongestDemandedLogInterval, nobody does.
   std::optional<EventPair> on_response(const Header& header, const DelayResp& response,
                                        FreeRunningTime now, Counters& counters) noexcept;
+  /// Mean time between requests.
   [[nodiscard]] Duration interval() const noexcept { return interval_; }
 
  private:

@@ -11,7 +11,8 @@
 namespace ftcs::ptp {
 
 /// What is measured before a transmitter is selected: one candidate, the first whose Sync is heard,
-/// and its newest pairs. They are worth something only if that candidate is the one selected.
+/// and its newest pairs. They are worth something only if that candidate is the one selected
+/// (decision 0011).
 class FastStart {
  public:
   /// Two exchanges: with them a servo knows offset, rate and delay.

@@ -23,7 +23,7 @@ inline constexpr std::int8_t kLongestLogInterval = 7;
   return Duration::from_whole_ns(kShortestNs << (log_interval - kShortestLogInterval));
 }
 
-/// times * interval, for small counts.
+/// times * interval, of whole nanoseconds; for small counts (no overflow is looked for).
 [[nodiscard]] constexpr Duration multiply(Duration interval, int times) noexcept {
   return Duration::from_whole_ns(interval.floor_ns() * times);
 }

@@ -43,6 +43,8 @@ struct ManagementCounters {
 /// Sans-I/O; the caller sends what is returned to where the request came from.
 class ManagementResponder {
  public:
+  /// The RESPONSE to a GET, or a MANAGEMENT_ERROR_STATUS (15.5.4): kNoSuchId for what we do not
+  /// know, kNotSetable, kNotSupported. None: not for us, or no management message; counted.
   [[nodiscard]] std::optional<ManagementBytes> answer(std::span<const std::uint8_t> request,
                                                       const ManagedPort& port) noexcept;
   /// Who wants to be told of what, where the request just answered has said so: linuxptp's phc2sys

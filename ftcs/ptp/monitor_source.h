@@ -33,6 +33,7 @@ class MonitorSource {
   /// The samples as they were reported; none of a datagram that cannot be read.
   [[nodiscard]] MonitorReport on_datagram(std::span<const std::uint8_t> bytes) noexcept;
 
+  /// One sample for a servo.
   struct Event {
     EventPair pair{};
     /// What was learnt before this sample belongs to another reference.

@@ -48,9 +48,12 @@ class PeerDelay {
 
   /// The first request is due at once.
   void start(FreeRunningTime now) noexcept;
+  /// Open exchanges, the neighbour and its rate are forgotten.
   void stop() noexcept;
+  /// When on_timer() must be called; none while it is stopped.
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
 
+  /// Sends the next request if it is due, and counts the last one as lost if it is still open.
   void on_timer(FreeRunningTime now, Port& port, ActionList& actions) noexcept;
   /// Any of the three messages; counted and ignored unless running.
   void on_message(const Message& message, std::optional<FreeRunningTime> received, Port& port,
@@ -71,8 +74,10 @@ class PeerDelay {
   void abandon_exchange() noexcept { exchange_.open = false; }
   /// asCapable (802.1AS-2020, 10.2.5.1); always true where it is not needed.
   [[nodiscard]] bool capable() const noexcept;
+  /// neighborRateRatio (802.1AS-2020, 10.2.5.7): the neighbour's clock in units of ours; 1 until
+  /// known.
   [[nodiscard]] Rate neighbor_rate_ratio() const noexcept { return rate_ratio_; }
-  /// The last one; none before the first.
+  /// The last one, without the asymmetry; none before the first.
   [[nodiscard]] std::optional<Duration> mean_link_delay() const noexcept;
 
  private:

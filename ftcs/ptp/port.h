@@ -31,12 +31,14 @@ class Port {
 
   /// A message that is for this port; else it is counted why not. Not in INITIALIZING and FAULTY.
   [[nodiscard]] std::optional<Message> read(std::span<const std::uint8_t> bytes) noexcept;
+  /// Of a message of this port: identity, domain, SDO, version; the unicast flag where it is so.
   [[nodiscard]] Header header(std::uint16_t sequence_id, std::int8_t log_interval) const noexcept;
   /// Counted as `sent`. In unicast operation every destination is the configured peer, but for
   /// answers.
   void send(const Message& message, Destination destination, Counter sent,
             ActionList& actions) noexcept;
   void change_state(PortState to, PortEvent event, ActionList& actions) noexcept;
+  /// An action that has no room is counted (kActionsDropped) and lost.
   void push(const Action& action, ActionList& actions) noexcept;
   void count(Counter counter, std::uint64_t times = 1) noexcept { counters_.add(counter, times); }
 

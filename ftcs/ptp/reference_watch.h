@@ -33,7 +33,11 @@ class ReferenceWatch {
   static constexpr Nanoseconds kLeastSpan{1'000'000'000};
   static constexpr Nanoseconds kLongestSpan{8'000'000'000};
 
-  enum class Verdict : std::uint8_t { kGoesOn, kDoubted, kJumped };
+  enum class Verdict : std::uint8_t {
+    kGoesOn,
+    kDoubted,  ///< contradicts what was believed, and not said often enough: not to be used
+    kJumped    ///< said often enough: this Sync is the first of the new time
+  };
   struct Finding {
     Verdict verdict = Verdict::kGoesOn;
     Duration jump{};  ///< kJumped: from the time before; positive: ahead

@@ -28,6 +28,7 @@ class MessageAuthenticationCode {
   ~MessageAuthenticationCode() = default;
 };
 
+/// One key; the function it is used by is not owned, and must outlive the association.
 struct SecurityKey {
   std::uint32_t id = 0;           ///< keyID, 1 or more
   std::uint8_t code_octets = 16;  ///< of the ICV, at most kMaximumCodeSize
@@ -54,6 +55,7 @@ struct SecurityAssociation {
   [[nodiscard]] const SecurityKey* find(std::uint32_t key_id) const noexcept;
 };
 
+/// What authenticate() found.
 enum class Authenticity : std::uint8_t {
   kAuthentic,
   kMissing,      ///< no AUTHENTICATION TLV at the end

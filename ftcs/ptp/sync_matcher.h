@@ -37,6 +37,8 @@ class SyncMatcher {
   /// `received` is t2; `now`, when we handle the message. A one-step Sync is a pair by itself.
   std::optional<EventPair> on_sync(const Header& header, const Sync& sync, FreeRunningTime received,
                                    FreeRunningTime now, Counters& counters) noexcept;
+  /// A pair, if the Sync was there already and no newer pair has been emitted. Whatever is left out
+  /// is counted.
   std::optional<EventPair> on_follow_up(const Header& header, const FollowUp& follow_up,
                                         FreeRunningTime now, Counters& counters) noexcept;
   void reset() noexcept { *this = SyncMatcher{}; }

@@ -18,6 +18,9 @@
 
 namespace ftcs::ptp {
 
+/// One port that receives. Clauses are IEEE 1588-2019's unless another standard is named. Nothing
+/// is checked here: an interval outside 2^-7 to 2^7 s is not used, other fields outside their
+/// ranges are taken at their word.
 struct TimeReceiverConfig {
   PortIdentity port{};                         ///< our own; unique in the network
   std::uint8_t domain = 0;                     ///< 7.1
@@ -60,6 +63,21 @@ inline constexpr Nanoseconds kMaximumCorrection{1'000'000'000};
 /// `now` and all event stamps are readings of the free-running clock. `now` must not run backward.
 /// It emits pairs and never judges a delay: that is for measurement and servo. No heap, no
 /// exceptions; each input costs a bounded time.
+///
+/// What is emitted, A being delayAsymmetry (11.6):
+///
+///     forward    reference = t1 + corrections of Sync and Follow_Up + A,  free_running = t2
+///     backward   reference = t4 - correction of Delay_Resp + A,           free_running = t3
+///     peer       mean_link_delay = ((t4 - t1) r - (t3 - t2)) / 2          (PeerDelay)
+///
+///     TimeReceiver port({.port = {ClockIdentity::from_mac(mac), 1}, .domain = 0});
+///     for (const Action& action : port.start(now)) perform(action);
+///     for (const Action& action : port.on_event_message(octets, t2, now)) perform(action);
+///     // SendMessage on Channel::kEvent: send it, then on_transmit_timestamp(its id(), stamp, now)
+///
+/// A message that cannot be used changes nothing but a counter, whose name says why (Counter). The
+/// way from pairs to a steered clock is node::ReceiverNode's. What the standard leaves open, and
+/// what was chosen: docs/spec-notes/ieee1588.md.
 class TimeReceiver {
  public:
   using Config = TimeReceiverConfig;
@@ -68,18 +86,24 @@ class TimeReceiver {
 
   /// INITIALIZING to LISTENING. Before, everything is ignored.
   [[nodiscard]] ActionList start(FreeRunningTime now) noexcept;
-  /// A message of the event port with its receive stamp.
+  /// A message of the event port (UDP 319; messageType below 8 on IEEE 802.3) with its receive
+  /// stamp, the latency of the interface taken off. Without a stamp a Sync is of no use: hand it to
+  /// on_general_message(), where it is counted as kWrongChannel.
   [[nodiscard]] ActionList on_event_message(std::span<const std::uint8_t> bytes,
                                             FreeRunningTime received, FreeRunningTime now) noexcept;
-  /// A message of the general port.
+  /// A message of the general port (UDP 320). May come before or after the event message that it
+  /// belongs to.
   [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
                                               FreeRunningTime now) noexcept;
-  /// When the event message with this id left us.
+  /// When the event message with this id left us, the latency of the interface added. Once for each
+  /// message; of one that nobody waits for it is counted and ignored.
   [[nodiscard]] ActionList on_transmit_timestamp(const EventId& id, FreeRunningTime sent,
                                                  FreeRunningTime now) noexcept;
   /// It is not known and never will be when the event message with this id left us.
   [[nodiscard]] ActionList on_transmit_timestamp_missing(const EventId& id,
                                                          FreeRunningTime now) noexcept;
+  /// Sends what is due, ends what has timed out (announceReceiptTimeout, 9.2.6.12). Calling it
+  /// early does no harm.
   [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
   /// To FAULTY; transmitter and open exchanges are forgotten.
   [[nodiscard]] ActionList on_link_down(FreeRunningTime now) noexcept;
@@ -99,7 +123,7 @@ class TimeReceiver {
   /// once.
   [[nodiscard]] std::optional<FreeRunningTime> deadline() const noexcept;
   [[nodiscard]] PortState state() const noexcept { return port_.state(); }
-  /// The selected transmitter; null if there is none.
+  /// The selected transmitter; null if there is none. Valid until the next input.
   [[nodiscard]] const TransmitterData* transmitter() const noexcept;
   [[nodiscard]] DelayMechanism delay_mechanism() const noexcept { return config_.delay_mechanism; }
   /// What the neighbour at the other end of the link measured as; peer to peer only.
@@ -113,6 +137,7 @@ class TimeReceiver {
   [[nodiscard]] Duration delay_request_interval() const noexcept {
     return delay_requests_.interval();
   }
+  /// Since construction; no fault and no other transmitter clears them.
   [[nodiscard]] const Counters& counters() const noexcept { return port_.counters(); }
 
  private:

@@ -12,6 +12,7 @@
 
 namespace ftcs::ptp {
 
+/// One port that transmits. Clauses are IEEE 1588-2019's unless another standard is named.
 struct TimeTransmitterConfig {
   PortIdentity port{};             ///< our own; its clock is the grandmaster that we announce
   std::uint8_t domain = 0;         ///< 7.1
@@ -50,6 +51,7 @@ class TimeTransmitter {
 
   /// INITIALIZING to LISTENING to MASTER; first Announce and Sync are due at once.
   [[nodiscard]] ActionList start(FreeRunningTime now) noexcept;
+  /// A Delay_Req (11.3) or a peer delay message (11.4), with its receive stamp, which is t4 or t2.
   [[nodiscard]] ActionList on_event_message(std::span<const std::uint8_t> bytes,
                                             ReferenceTime received, FreeRunningTime now) noexcept;
   [[nodiscard]] ActionList on_general_message(std::span<const std::uint8_t> bytes,
@@ -60,6 +62,7 @@ class TimeTransmitter {
   /// No Follow_Up is sent.
   [[nodiscard]] ActionList on_transmit_timestamp_missing(const EventId& id,
                                                          FreeRunningTime now) noexcept;
+  /// Announce and Sync, as they are due. After a pause one of each, then the schedule.
   [[nodiscard]] ActionList on_timer(FreeRunningTime now) noexcept;
   /// To FAULTY: nothing is sent.
   [[nodiscard]] ActionList on_link_down(FreeRunningTime now) noexcept;

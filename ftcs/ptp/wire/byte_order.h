@@ -16,6 +16,7 @@ class ByteReader {
  public:
   explicit constexpr ByteReader(std::span<const std::uint8_t> bytes) noexcept : bytes_(bytes) {}
 
+  /// kOctets of an unsigned integer, 1 to 8: six for the seconds of a Timestamp.
   template <class Integer, std::size_t kOctets = sizeof(Integer)>
   constexpr Integer read() noexcept {
     static_assert(kOctets <= sizeof(Integer));
@@ -51,7 +52,7 @@ class ByteReader {
   std::size_t offset_ = 0;
 };
 
-/// Writes big-endian integers; what does not fit is dropped.
+/// Writes big-endian integers; what does not fit is dropped, octet by octet.
 class ByteWriter {
  public:
   explicit constexpr ByteWriter(std::span<std::uint8_t> bytes) noexcept : bytes_(bytes) {}

@@ -52,6 +52,7 @@ struct MessageBytes {
   }
 };
 
+/// Why a message cannot be written.
 enum class EncodeError : std::uint8_t {
   kTimestampOutOfRange,   ///< before the epoch: seconds are unsigned on the wire
   kCorrectionOutOfRange,  ///< beyond ±2^47 ns

@@ -91,9 +91,10 @@ struct Announce {
   friend constexpr bool operator==(const Announce&, const Announce&) noexcept = default;
 };
 
-/// 13.6.1, Table 44.
+/// 13.6.1, Table 44. Of a two-step Sync the origin is an estimate, or zero: preciseOriginTimestamp
+/// comes in the Follow_Up.
 struct Sync {
-  ReferenceTime origin{};
+  ReferenceTime origin{};  ///< originTimestamp: t1 of a one-step Sync
   friend constexpr bool operator==(const Sync&, const Sync&) noexcept = default;
 };
 /// 13.6.1, Table 44.
@@ -119,7 +120,7 @@ struct FollowUpInformation {
 
 /// 13.7.1, Table 45.
 struct FollowUp {
-  ReferenceTime precise_origin{};
+  ReferenceTime precise_origin{};  ///< preciseOriginTimestamp: t1
   // Not std::optional: gcc 12 warns of uninitialised reads that cannot happen.
   bool has_information = false;
   FollowUpInformation information{};
@@ -127,8 +128,8 @@ struct FollowUp {
 };
 /// 13.8.1, Table 46.
 struct DelayResp {
-  ReferenceTime receive{};
-  PortIdentity requesting_port{};
+  ReferenceTime receive{};         ///< receiveTimestamp: t4
+  PortIdentity requesting_port{};  ///< who asked; others ignore it
   friend constexpr bool operator==(const DelayResp&, const DelayResp&) noexcept = default;
 };
 /// 13.9.1, Table 47 (ten reserved octets follow on the wire).
@@ -138,13 +139,13 @@ struct PdelayReq {
 };
 /// 13.10.1, Table 48.
 struct PdelayResp {
-  ReferenceTime request_receipt{};
+  ReferenceTime request_receipt{};  ///< t2; zero where turn-around is in the correction alone
   PortIdentity requesting_port{};
   friend constexpr bool operator==(const PdelayResp&, const PdelayResp&) noexcept = default;
 };
 /// 13.11.1, Table 49.
 struct PdelayRespFollowUp {
-  ReferenceTime response_origin{};
+  ReferenceTime response_origin{};  ///< t3; zero as above
   PortIdentity requesting_port{};
   friend constexpr bool operator==(const PdelayRespFollowUp&,
                                    const PdelayRespFollowUp&) noexcept = default;
