@@ -8,6 +8,7 @@
 
 namespace ftcs::ethercat {
 
+/// Of the distributed clocks, before the first cycle.
 struct ClockSetupConfig {
   /// Drift compensation before the first cycle: so many system times, as fast as frames come back
   /// (ETG.1020 speaks of about 15000).
@@ -21,6 +22,13 @@ struct ClockSetupConfig {
 /// The reference's system time becomes what the MainDevice's clock showed when it sent the latching
 /// frame. For all others:  offset = offset(ref) + local(ref) - local + delay, both latched by one
 /// frame: what runs between two reads does not enter.
+///
+///     latch     BWR 0x0900: each controller keeps the local time at which this frame came
+///     read      0x0900 to 0x090F, 0x0918 of each; compute_propagation_delays()
+///     write     0x0920 (offset) and 0x0928 (delay) of each, 0x0930 to start its control loop anew
+///     drift     FRMW of the reference's 0x0910, drift_pulses times
+///
+/// A Procedure: request() and reply() in turn; neither waits.
 class ClockSetup {
  public:
   void start(const ClockSetupConfig& config) noexcept;

@@ -26,6 +26,8 @@ struct DriveSync {
   friend bool operator==(const DriveSync&, const DriveSync&) = default;
 };
 
+/// What SubDevices are given on their way to SAFEOP. Valid: cycle above zero and below 2^32 ns
+/// (0x09A0 has 32 bits), sync0_shift of the whole segment and of each drive within a cycle.
 struct ConfiguratorConfig {
   std::span<const SdoDownload> objects;  ///< written to every SubDevice with CoE, in PREOP
   Nanoseconds cycle{1'000'000};
@@ -52,6 +54,10 @@ inline constexpr std::size_t kMaxImageSize = 1380;
 /// Takes all SubDevices from INIT to SAFEOP, one step for all of them before the next: mailboxes,
 /// PREOP, objects, sizes of the process data (from CoE, else from the SII), sync managers and
 /// FMMUs, SYNC0, SAFEOP.
+///
+///     sync0_start = (floor(S / cycle) + 1) cycle + sync0_shift,   S = system time + sync0_lead
+///
+/// written to 0x0990 of each before 0x0981 activates it: a start in the past would never come.
 class Configurator {
  public:
   void start(const ConfiguratorConfig& config) noexcept;

@@ -27,6 +27,7 @@ struct CycleReport {
   std::uint16_t compared = kNobody;
   std::uint16_t answering = 0;  ///< SubDevices that this frame passed
   std::uint16_t states = 0;     ///< AL states OR-ed, error flag included
+  /// Everybody who answered is in OP, without an error.
   [[nodiscard]] bool all_operational() const noexcept {
     return states == static_cast<std::uint16_t>(AlState::kOp);
   }
@@ -40,8 +41,11 @@ struct CycleReport {
 /// zero and nobody expects it in the working counter.
 class CyclicExchange {
  public:
+  /// All SubDevices take part; the image is zero.
   void start(const Network& network) noexcept;
+  /// Writes the frame of a cycle; what follows in the writer is the caller's.
   void request(FrameWriter& writer, const Network& network) noexcept;
+  /// Takes the answer to the last request, whose structure the caller has checked.
   [[nodiscard]] CycleReport reply(const FrameView& frame, Network& network) noexcept;
 
   /// AL control for one SubDevice, sent in its turn with a later frame.
@@ -51,6 +55,7 @@ class CyclicExchange {
   [[nodiscard]] bool takes_part(std::size_t position) const noexcept {
     return takes_part_[position];
   }
+  /// From the next frame on it is expected in the working counter, or it is not.
   void admit(const Network& network, std::size_t position) noexcept {
     set_part(network, position, true);
   }

@@ -9,6 +9,7 @@
 
 namespace ftcs::ethercat {
 
+/// Why a bring-up or a run has ended; fields of Failure that belong to a kind are named with it.
 enum class FailureKind : std::uint8_t {
   kNone,
   kNoReply,              ///< frames go out and none comes back

@@ -13,6 +13,9 @@
 
 namespace ftcs::ethercat {
 
+/// How a segment is brought up, run and given up. Counts in a row must be above zero; nothing is
+/// checked here. `clocks` and `process` say what is valid of theirs; spans in `process` are not
+/// owned and must live as long as the MainDevice.
 struct MainDeviceConfig {
   std::size_t expected_subdevices = 0;  ///< zero: any number
   bool scan_only = false;               ///< stop in INIT after scan and clock setup
@@ -41,13 +44,14 @@ struct MainDeviceConfig {
   Nanoseconds stop_timeout{200'000'000};
 };
 
+/// Where the MainDevice is; stages are passed in this order, and a failure leads to the last two.
 enum class Stage : std::uint8_t {
-  kScan,
-  kClocks,
-  kConfigure,
-  kCyclic,    ///< frames leave at the cycle's instants; SAFEOP, or OP once it was asked for
-  kStopping,  ///< everybody is being sent to SAFEOP
-  kStopped,   ///< nothing more to send: failure() tells why, if not on request
+  kScan,       ///< count, addresses, identity, SII, topology (Scanner)
+  kClocks,     ///< delays, offsets, drift of the distributed clocks (ClockSetup)
+  kConfigure,  ///< INIT to SAFEOP: mailboxes, objects, sync managers, FMMUs, SYNC0 (Configurator)
+  kCyclic,     ///< frames leave at the cycle's instants; SAFEOP, or OP once it was asked for
+  kStopping,   ///< everybody is being sent to SAFEOP
+  kStopped,    ///< nothing more to send: failure() tells why, if not on request
 };
 [[nodiscard]] const char* name(Stage stage) noexcept;
 
@@ -61,18 +65,20 @@ struct FrameStamps {
   ReferenceTime system_time{};
 };
 
+/// What came of an answer, or of none.
 enum class FrameOutcome : std::uint8_t {
   kIgnored,   ///< not the answer that was waited for: foreign, malformed, or late
   kProgress,  ///< ask for the next frame at once
   kCycle,     ///< last_cycle() is new
-  kStopped,
+  kStopped,   ///< nothing more to send; failure() says why
 };
 
+/// Since construction; those "in a row" are what the limits of the configuration look at.
 struct CycleCounters {
   std::uint64_t sent = 0;
-  std::uint64_t lost = 0;
-  std::uint64_t wrong_working_counter = 0;
-  std::uint64_t ignored = 0;
+  std::uint64_t lost = 0;                   ///< not answered in time, in every stage
+  std::uint64_t wrong_working_counter = 0;  ///< answered, and not by all: inputs are not new
+  std::uint64_t ignored = 0;                ///< frames that were no answer
   std::uint32_t lost_in_a_row = 0;
   std::uint32_t wrong_in_a_row = 0;
   std::uint32_t absent_in_a_row = 0;  ///< cycles in which fewer answered than were scanned
@@ -82,6 +88,27 @@ struct CycleCounters {
 /// The EtherCAT MainDevice without a socket and without a clock: asks for frames to be sent and
 /// takes what came back or did not. Before the cyclic stage the caller sends the next frame as soon
 /// as the last is answered; in it, at each cycle's instant.
+///
+///     MainDevice main(config);
+///     while (!main.cyclic() && main.stage() != Stage::kStopped) {   // some 15,000 frames
+///       link.send(main.next_frame());
+///       if (link.receive(frame, 10ms)) main.on_frame(frame, stamps); else main.on_timeout();
+///     }
+///     main.request_operational();                                   // once the cycle is in phase
+///     each cycle: write main.outputs(n), send, receive as above, read main.inputs(n)
+///
+/// One frame is out at a time, with all that a cycle needs (CyclicExchange): the reference's system
+/// time by FRMW of 0x0910, the process image by LRW, states and clock differences. The expected
+/// working counter of the LRW is 2 for each SubDevice with outputs and 1 for each with inputs
+/// (ETG.1000.4, 5.4); inputs count only where it is met.
+///
+/// Given up, by way of SAFEOP (AL control 0x0120 to all): lost_frame_limit, working_counter_limit,
+/// absence_limit, a reintegration that fails again and again. During the bring-up the first error
+/// stops at once. Standards: ETG.1000.4 (data link), .6 (states, CoE), ETG.1020 (clocks); what they
+/// leave open: docs/spec-notes/ethercat.md.
+///
+/// Positions count from 0 in the order of the wire and must be below network().count, unchecked.
+/// One thread; no heap; a fixed amount of work for each call.
 class MainDevice {
  public:
   explicit MainDevice(const MainDeviceConfig& config) noexcept;
@@ -89,21 +116,32 @@ class MainDevice {
   /// The next frame (from the EtherCAT header on), valid until the next call. Empty when stopped. A
   /// frame that is still out counts as lost.
   [[nodiscard]] ConstBytes next_frame() noexcept;
-  /// What came back; the bytes are read in place.
+  /// What came back, from the EtherCAT header on; the bytes are read in place. It is the answer if
+  /// it has the number, commands, addresses and sizes of the frame that is out; else kIgnored, and
+  /// the frame is still out.
   FrameOutcome on_frame(Bytes frame, const FrameStamps& stamps) noexcept;
+  /// The frame that is out does not come back any more. During the bring-up the same is asked for
+  /// again, `retries` times in a row.
   FrameOutcome on_timeout() noexcept;
 
-  /// In the cyclic stage: ask all SubDevices for OP.
+  /// In the cyclic stage: ask all SubDevices for OP, one with each of the next frames. Who was
+  /// restarted is asked by itself afterwards.
   void request_operational() noexcept;
-  /// Acknowledge the error of one SubDevice and bring it back to what the others are in.
+  /// One step back to OP: an error is acknowledged (AL control SAFEOP with bit 4), and a SubDevice
+  /// in SAFEOP without one is asked for OP. Nothing for any other; to be called again until it is
+  /// there.
   void recover(std::size_t position) noexcept;
-  /// All to SAFEOP, then nothing more.
+  /// All to SAFEOP, then nothing more: go on with next_frame() until it is empty. `reason`: what
+  /// failure() shall say; kNone: on request.
   void stop(FailureKind reason = FailureKind::kNone) noexcept { begin_stop({.kind = reason}); }
 
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   [[nodiscard]] bool cyclic() const noexcept { return stage_ == Stage::kCyclic; }
+  /// What has gone wrong first, and whose fault it was.
   [[nodiscard]] const Failure& failure() const noexcept { return failure_; }
+  /// What the scan has found, and each SubDevice's state as last read.
   [[nodiscard]] const Network& network() const noexcept { return network_; }
+  /// Of the last frame that was answered: after a lost one it is that of the cycle before.
   [[nodiscard]] const CycleReport& last_cycle() const noexcept { return cycle_; }
   [[nodiscard]] const CycleCounters& counters() const noexcept { return counters_; }
   /// Position of the SubDevice that is being brought back at present; count(): none.
@@ -114,6 +152,7 @@ class MainDevice {
   [[nodiscard]] bool stop_confirmed() const noexcept { return stop_confirmed_; }
   /// In the cyclic stage: all that were configured exchange process data.
   [[nodiscard]] bool complete() const noexcept;
+  /// This one exchanges process data: it is in SAFEOP or OP, as far as is known.
   [[nodiscard]] bool takes_part(std::size_t position) const noexcept {
     return exchange_.takes_part(position);
   }
@@ -126,9 +165,12 @@ class MainDevice {
   void shift_system_time(std::int64_t by_ns) noexcept;
   /// CyclicExchange::write_system_time().
   void write_system_time(ReferenceTime time) noexcept { exchange_.write_system_time(time); }
-  /// System time of the first SYNC0.
+  /// System time of the first SYNC0, ns; zero: there is none.
   [[nodiscard]] std::uint64_t sync0_start() const noexcept { return configurator_.sync0_start(); }
 
+  /// The SubDevice's part of the process image, in the cyclic stage: outputs go with the next
+  /// frame, inputs are those of the last cycle with the right working counter, or zero while it
+  /// takes no part. Empty where it has none.
   [[nodiscard]] Bytes outputs(std::size_t position) noexcept {
     return exchange_.outputs(network_.devices[position]);
   }

@@ -42,10 +42,10 @@ struct SubDeviceInfo {
   int parent = kMainDevice;      ///< position of the SubDevice it hangs on
   std::uint8_t parent_port = 0;  ///< and at which port
 
-  std::array<std::uint32_t, reg::kPorts> receive_times{};
-  std::uint64_t receive_time = 0;  ///< at the processing unit, local time
-  std::uint32_t propagation_delay = 0;
-  std::uint64_t system_time_offset = 0;
+  std::array<std::uint32_t, reg::kPorts> receive_times{};  ///< 0x0900, local time, mod 2^32 ns
+  std::uint64_t receive_time = 0;                          ///< 0x0918: at the processing unit
+  std::uint32_t propagation_delay = 0;   ///< 0x0928, ns from the reference to here
+  std::uint64_t system_time_offset = 0;  ///< 0x0920, system less local, modulo 2^64 ns
   /// |0x092C|, ns, as read in its turn.
   std::uint32_t system_time_difference = 0;
 
@@ -82,6 +82,7 @@ struct Network {
     return {devices.data(), count};
   }
   [[nodiscard]] bool has_reference() const noexcept { return reference < count; }
+  /// How many have a distributed clock.
   [[nodiscard]] std::size_t clocks() const noexcept;
 };
 

@@ -23,9 +23,11 @@ struct SdoDownload {
 /// whatever else comes is passed over; none of it prolongs the deadline.
 class SdoClient {
  public:
+  /// `timeout`: from the first answer of any kind on, in the MainDevice's clock.
   void start_download(const SdoDownload& download, Nanoseconds timeout) noexcept;
   void start_upload(ObjectAddress object, Nanoseconds timeout) noexcept;
   void request(FrameWriter& writer, const SubDeviceInfo& device) noexcept;
+  /// kFailed: kSdoAborted with the code, kSdoTimeout or kSdoMalformed in `failure`.
   [[nodiscard]] Progress reply(const FrameView& frame, std::size_t position, FreeRunningTime now,
                                Failure& failure) noexcept;
   /// What an upload brought, up to four bytes.

@@ -5,20 +5,22 @@
 
 namespace ftcs::ethercat {
 
-/// States of the application layer (ETG.1000.6, 6.4.1).
+/// States of the application layer (ETG.1000.6, 6.4.1), as AL control and AL status hold them.
 enum class AlState : std::uint8_t {
-  kNone = 0,
-  kInit = 1,
-  kPreOp = 2,
-  kBootstrap = 3,
-  kSafeOp = 4,
-  kOp = 8,
+  kNone = 0,       ///< not known, or out of reach
+  kInit = 1,       ///< no mailbox, no process data
+  kPreOp = 2,      ///< mailbox: objects can be read and written
+  kBootstrap = 3,  ///< firmware download
+  kSafeOp = 4,     ///< inputs are valid, outputs are held in a safe state
+  kOp = 8,         ///< outputs act
 };
 inline constexpr std::uint16_t kAlStateMask = 0x0F;
 /// In AL status: the SubDevice refused or left a state. In AL control: acknowledge it.
 inline constexpr std::uint16_t kAlErrorFlag = 0x10;
 
-/// AL status codes (ETG.1000.6, 5.3.2; ETG.1020).
+/// AL status codes (ETG.1000.6, 5.3.2; ETG.1020): why a SubDevice refused or left a state. Those
+/// that a cycle out of phase brings about are 0x001A and 0x002C (SYNC0 and frames do not fit
+/// together), 0x001B (no outputs for a while), 0x0032 and 0x0034 (its own PLL, or no SYNC0).
 enum class AlStatusCode : std::uint16_t {
   kNoError = 0x0000,
   kUnspecifiedError = 0x0001,

@@ -21,6 +21,7 @@ template <std::unsigned_integral T>
   return static_cast<T>(value);
 }
 
+/// The counterpart of load(), under the same condition.
 template <std::unsigned_integral T>
 constexpr void store(Bytes bytes, std::size_t at, T value) noexcept {
   for (std::size_t i = 0; i < sizeof(T); ++i) {

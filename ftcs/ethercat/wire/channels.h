@@ -12,16 +12,17 @@ namespace ftcs::ethercat {
 /// logical address, bit by bit (ETG.1000.4, 6.6). Logical bits run from logical_start * 8 +
 /// start_bit to (logical_start + length - 1) * 8 + stop_bit.
 struct FmmuChannel {
-  std::uint32_t logical_start = 0;
-  std::uint16_t length = 0;
-  std::uint8_t start_bit = 0;
-  std::uint8_t stop_bit = 7;
-  std::uint16_t physical_start = 0;
+  std::uint32_t logical_start = 0;   ///< octets in the logical address space of 4 GiByte
+  std::uint16_t length = 0;          ///< octets that are touched, the first and last one included
+  std::uint8_t start_bit = 0;        ///< of the first octet, 0 to 7
+  std::uint8_t stop_bit = 7;         ///< of the last octet, 0 to 7
+  std::uint16_t physical_start = 0;  ///< in the memory of the controller
   std::uint8_t physical_bit = 0;
-  bool read = false;
-  bool write = false;
+  bool read = false;   ///< inputs
+  bool write = false;  ///< outputs
   bool active = false;
 
+  /// bytes.size() must be at least reg::kFmmuSize.
   [[nodiscard]] static constexpr FmmuChannel decode(ConstBytes bytes) noexcept {
     constexpr std::uint8_t kBit = 0x07;
     return {load<std::uint32_t>(bytes, 0),
@@ -66,6 +67,7 @@ struct SyncManagerChannel {
   }
   [[nodiscard]] constexpr bool watchdog() const noexcept { return (control & kWatchdog) != 0; }
 
+  /// bytes.size() must be at least reg::kSyncManagerSize.
   [[nodiscard]] static constexpr SyncManagerChannel decode(ConstBytes bytes) noexcept {
     return {load<std::uint16_t>(bytes, 0), load<std::uint16_t>(bytes, 2), bytes[4],
             (bytes[6] & 1U) != 0};

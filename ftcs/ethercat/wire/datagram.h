@@ -9,25 +9,29 @@ namespace ftcs::ethercat {
 
 /// Commands of a datagram (ETG.1000.4, 5.4). First letters: auto-increment, configured (fixed)
 /// address, broadcast, logical; M: one SubDevice is read and all others are written.
+///
+/// Each SubDevice that is meant and can do it adds to the working counter: 1 for a read, 1 for a
+/// write, 3 for both (a read 1, a write 2). Broadcast reads OR what they find into the data.
 enum class Command : std::uint8_t {
-  kNop = 0,
-  kAprd = 1,
-  kApwr = 2,
-  kAprw = 3,
-  kFprd = 4,
-  kFpwr = 5,
-  kFprw = 6,
-  kBrd = 7,
-  kBwr = 8,
-  kBrw = 9,
-  kLrd = 10,
-  kLwr = 11,
-  kLrw = 12,
-  kArmw = 13,
-  kFrmw = 14,
+  kNop = 0,    ///< passes by
+  kAprd = 1,   ///< read by position
+  kApwr = 2,   ///< write by position
+  kAprw = 3,   ///< both: first read, then written
+  kFprd = 4,   ///< read by station address (0x0010)
+  kFpwr = 5,   ///< write by station address
+  kFprw = 6,   ///< both
+  kBrd = 7,    ///< read of all, OR-ed
+  kBwr = 8,    ///< write to all
+  kBrw = 9,    ///< both
+  kLrd = 10,   ///< read of the process image, through FMMUs
+  kLwr = 11,   ///< write to it
+  kLrw = 12,   ///< both: the cycle's process data
+  kArmw = 13,  ///< read at the position, written by all others
+  kFrmw = 14,  ///< the same by station address: how the reference's 0x0910 is given to all
 };
 inline constexpr std::uint8_t kLastCommand = 14;
 
+/// What `position` and `offset` of a datagram mean.
 enum class Addressing : std::uint8_t { kNone, kAutoIncrement, kConfigured, kBroadcast, kLogical };
 
 [[nodiscard]] constexpr Addressing addressing(Command command) noexcept {
@@ -112,6 +116,7 @@ class Datagram {
     return load<std::uint16_t>(bytes_, bytes_.size() - kWorkingCounterSize);
   }
 
+  // What a SubDevice, or who numbers frames, does to a datagram on its way.
   constexpr void set_index(std::uint8_t index) const noexcept { bytes_[1] = index; }
   constexpr void set_position(std::uint16_t position) const noexcept { store(bytes_, 2, position); }
   constexpr void add_event(std::uint16_t event) const noexcept {

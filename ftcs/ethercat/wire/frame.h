@@ -9,6 +9,7 @@
 
 namespace ftcs::ethercat {
 
+/// Why octets are no EtherCAT frame, or one cannot be written.
 enum class FrameError : std::uint8_t {
   kTooShort,           ///< not even a header
   kForeign,            ///< an Ethernet frame of another EtherType
@@ -35,8 +36,12 @@ inline constexpr std::uint16_t kUdpPort = 0x88A4;
 /// An EtherCAT frame (header of 2 bytes and datagrams) whose structure has been checked as a whole:
 /// iterating it needs no further checks. Trailing bytes are padding. It refers to the caller's
 /// bytes.
+///
+///     if (const auto frame = FrameView::parse(octets))
+///       for (const Datagram datagram : *frame) use(datagram.command(), datagram.data());
 class FrameView {
  public:
+  /// From the EtherCAT header on (ETG.1000.4, 5.3). Whole or not at all.
   [[nodiscard]] static Result<FrameView, FrameError> parse(Bytes frame) noexcept;
 
   class Iterator {

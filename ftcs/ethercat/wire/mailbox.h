@@ -72,6 +72,7 @@ struct Sdo {
   [[nodiscard]] std::uint32_t value() const noexcept;
 };
 
+/// What a mailbox holds, from its header on; an abort is a value (kAbort), no error.
 [[nodiscard]] Result<Sdo, MailboxError> decode_sdo(ConstBytes mailbox) noexcept;
 /// Writes the message into a mailbox; false if it does not fit. Up to four bytes of data go
 /// expedited.

@@ -7,6 +7,9 @@
 /// Addresses in the memory of a SubDevice controller. Clauses are those of ETG.1000.4 (IEC
 /// 61158-4-12); widths in octets; everything little-endian. "Local" is what one SubDevice has of
 /// its own, "system" what all of them agree on.
+///
+/// An address is the `offset` of a datagram's Target. A SubDevice that does not have it, or does
+/// not let it be written, does not count in the working counter.
 namespace ftcs::ethercat::reg {
 
 // 6.1.1, information of the controller: read only.
@@ -19,7 +22,7 @@ inline constexpr std::uint16_t kRamSize = 0x0006;           ///< 1: process RAM 
 inline constexpr std::uint16_t kPortDescriptor = 0x0007;    ///< 1: 2 bits a port; 3 = MII
 inline constexpr std::uint16_t kFeatures = 0x0008;  ///< 2: bits kFeatureDc, kFeatureDc64, ...
 
-// 6.1.2, addresses.
+// 6.1.2, addresses: by which a datagram of configured addressing finds the SubDevice.
 inline constexpr std::uint16_t kStationAddress =
     0x0010;                                             ///< 2: given by the MainDevice at the scan
 inline constexpr std::uint16_t kStationAlias = 0x0012;  ///< 2: from SII or switches
@@ -28,13 +31,15 @@ inline constexpr std::uint16_t kStationAlias = 0x0012;  ///< 2: from SII or swit
 inline constexpr std::uint16_t kDlControl = 0x0100;  ///< 4: loops of the ports, use of the alias
 inline constexpr std::uint16_t kDlStatus = 0x0110;   ///< 2: link, loop and signal of each port
 
-// 6.1.5, application layer (states: ETG.1000.6, 6.4.1).
+// 6.1.5, application layer (states: ETG.1000.6, 6.4.1). A state is asked for by 0x0120 and reached
+// when 0x0130 shows it; bit 4 of 0x0130 says that it was refused or left, 0x0134 why, until bit 4
+// of 0x0120 acknowledges it.
 inline constexpr std::uint16_t kAlControl = 0x0120;     ///< 2: state asked for; bit 4 acknowledges
 inline constexpr std::uint16_t kAlStatus = 0x0130;      ///< 2: state; bit 4: an error
 inline constexpr std::uint16_t kAlStatusCode = 0x0134;  ///< 2: which (AlStatusCode)
 inline constexpr std::uint16_t kPdiControl = 0x0140;    ///< 1: kind of the application's interface
 
-// 6.1.6, events.
+// 6.1.6, events: interrupts towards both sides. This MainDevice polls instead, and masks none.
 inline constexpr std::uint16_t kEventMask = 0x0200;       ///< 2: which events show in datagrams
 inline constexpr std::uint16_t kAlEventMask = 0x0204;     ///< 4: which events the application hears
 inline constexpr std::uint16_t kEventRequest = 0x0210;    ///< 2: events for the MainDevice
@@ -51,18 +56,27 @@ inline constexpr std::uint16_t kWatchdogTimeProcessData = 0x0420;  ///< 2: witho
 inline constexpr std::uint16_t kWatchdogStatus = 0x0440;           ///< 2: bit 0 = not expired
 inline constexpr std::uint16_t kWatchdogCounter = 0x0442;          ///< 1: how often it expired
 
-// 6.4, SubDevice information interface: addresses in words of 16 bits.
+// 6.4, SubDevice information interface: addresses in words of 16 bits. A read: the word's address
+// to 0x0504, the command to 0x0502, then 0x0502 until bit 15 falls, then 0x0508 (sii.h).
 inline constexpr std::uint16_t kSiiConfiguration = 0x0500;  ///< 1: bit 0: the application owns it
 inline constexpr std::uint16_t kSiiControl = 0x0502;        ///< 2: command; bit 15: busy
 inline constexpr std::uint16_t kSiiAddress = 0x0504;        ///< 4: word
 inline constexpr std::uint16_t kSiiData = 0x0508;           ///< 4 or 8 (control, bit 6)
 
-// 6.6 and 6.7, channels (channels.h).
+// 6.6 and 6.7, channels (channels.h): written in PREOP, before SAFEOP is asked for.
 inline constexpr std::uint16_t kFmmu = 0x0600;         ///< 16 each: memory at logical addresses
 inline constexpr std::uint16_t kSyncManager = 0x0800;  ///< 8 each: consistent pieces of memory
 
 // 6.8, distributed clock. Nanoseconds. Local time counts from power on; system time = local time +
 // offset counts from 2000-01-01 where somebody set it so.
+//
+//     system copy = local time + 0x0920
+//     0x092C      = mean of (system copy - (received + 0x0928)),  received: what FRMW of 0x0910
+//                   brought from the reference, once a cycle
+//
+// A control loop in each SubDevice keeps 0x092C at zero by the rate of its local time (0x0932); the
+// reference has nobody to follow. At the scan a write to 0x0900 latches one frame's arrivals, of
+// which the delays are reckoned (compute_propagation_delays()).
 inline constexpr std::uint16_t kReceiveTimePort0 =
     0x0900;  ///< 4 a port: local time, mod 2^32, at
              ///< which the frame that wrote here came
@@ -82,7 +96,8 @@ inline constexpr std::uint16_t kSpeedCounterDifference = 0x0932;
 inline constexpr std::uint16_t kSystemTimeDifferenceFilter = 0x0934;  ///< 1: mean over 2^n frames
 inline constexpr std::uint16_t kSpeedCounterFilter = 0x0935;          ///< 1: the same of the rate
 
-// 6.8, SYNC signals. Times are system time, nanoseconds.
+// 6.8, SYNC signals. Times are system time, nanoseconds. SYNC0 comes at 0x0990 + n * 0x09A0; the
+// times are written first, 0x0981 activates them.
 inline constexpr std::uint16_t kCyclicUnitControl =
     0x0980;                                                 ///< 1: 0 = the MainDevice owns the unit
 inline constexpr std::uint16_t kDcActivation = 0x0981;      ///< 1: kActivateCyclic, kActivateSync0

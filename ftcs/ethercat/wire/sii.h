@@ -9,6 +9,7 @@
 
 namespace ftcs::ethercat {
 
+/// Why an image of the SII cannot be used.
 enum class SiiError : std::uint8_t {
   kTooShort,           ///< less than the fixed part of 0x40 words
   kBadChecksum,        ///< CRC-8 of words 0 to 6 does not fit word 7
@@ -20,24 +21,25 @@ enum class SiiError : std::uint8_t {
 
 /// Addresses in words, categories (ETG.1000.6, 5.4; ETG.2010).
 namespace sii {
-inline constexpr std::size_t kChecksumWord = 0x07;
-inline constexpr std::size_t kAliasWord = 0x04;
-inline constexpr std::size_t kIdentityWord = 0x08;
-inline constexpr std::size_t kMailboxWord = 0x18;
-inline constexpr std::size_t kProtocolsWord = 0x1C;
-inline constexpr std::size_t kSizeWord = 0x3E;
-inline constexpr std::size_t kCategoriesWord = 0x40;
-inline constexpr std::uint16_t kStrings = 10;
-inline constexpr std::uint16_t kGeneral = 30;
-inline constexpr std::uint16_t kFmmus = 40;
-inline constexpr std::uint16_t kSyncManagers = 41;
-inline constexpr std::uint16_t kTxPdo = 50;
-inline constexpr std::uint16_t kRxPdo = 51;
-inline constexpr std::uint16_t kDc = 60;
-inline constexpr std::uint16_t kEnd = 0xFFFF;
-inline constexpr std::uint16_t kProtocolCoe = 0x04;
+inline constexpr std::size_t kChecksumWord = 0x07;    ///< CRC-8 of the words before, low octet
+inline constexpr std::size_t kAliasWord = 0x04;       ///< configured station alias
+inline constexpr std::size_t kIdentityWord = 0x08;    ///< vendor, product, revision, serial
+inline constexpr std::size_t kMailboxWord = 0x18;     ///< receive and send: start and size
+inline constexpr std::size_t kProtocolsWord = 0x1C;   ///< bits: kProtocolCoe, ...
+inline constexpr std::size_t kSizeWord = 0x3E;        ///< of the memory, KiBit less 1
+inline constexpr std::size_t kCategoriesWord = 0x40;  ///< type, length in words, content; and so on
+inline constexpr std::uint16_t kStrings = 10;         ///< all names, by number from 1
+inline constexpr std::uint16_t kGeneral = 30;         ///< numbers of names, CoE details, flags
+inline constexpr std::uint16_t kFmmus = 40;           ///< what each FMMU is meant for
+inline constexpr std::uint16_t kSyncManagers = 41;    ///< start, length, control of each
+inline constexpr std::uint16_t kTxPdo = 50;           ///< inputs: sync manager, entries
+inline constexpr std::uint16_t kRxPdo = 51;           ///< outputs
+inline constexpr std::uint16_t kDc = 60;              ///< modes: cycle, shift, AssignActivate
+inline constexpr std::uint16_t kEnd = 0xFFFF;         ///< no more categories
+inline constexpr std::uint16_t kProtocolCoe = 0x04;   ///< in kProtocolsWord
 }  // namespace sii
 
+/// Who made it, what it is, which one it is (object 0x1018).
 struct Identity {
   std::uint32_t vendor = 0;
   std::uint32_t product = 0;
@@ -46,6 +48,7 @@ struct Identity {
   friend constexpr bool operator==(const Identity&, const Identity&) noexcept = default;
 };
 
+/// Octets in the memory of the controller; size 0: there is none.
 struct MailboxWindow {
   std::uint16_t start = 0;
   std::uint16_t size = 0;
