@@ -29,8 +29,10 @@ struct ClockState {
   /// t cycles later (negative: earlier; the noise grows by |t|):
   ///
   ///     x += y t,   P = F P F' + Q,   F = [1 t 0; 0 1 0; 0 0 1]
-  ///     Q_xx = a |t| + b |t|^3 / 3,   Q_xy = b t |t| / 2,   Q_yy = b |t|, Q_dd
-  ///     = walk |t|
+  ///     Q_xx = a |t| + b |t|^3 / 3,   Q_xy = b t |t| / 2,   Q_yy = b |t|,   Q_dd = walk |t|
+  ///
+  /// The exact discretisation of white FM (a) and random-walk FM (b) that act
+  /// between the two instants.
   void elapse(double t, const ProcessNoise<V>& q) noexcept {
     const double span = std::abs(t);
     const double cube = span * span * span / 3.0;

@@ -8,9 +8,10 @@ namespace ftcs::estimation {
 /// exponential of mean `tail` (queueing is never negative). The zero of the
 /// delay is the floor of the exponential part.
 struct DelayShape {
-  double variance = 1.0;
-  double tail = 0.0;
+  double variance = 1.0;  ///< > 0, units of s^2
+  double tail = 0.0;      ///< >= 0, units of s
 
+  /// Of the sum of both parts: that of an exponential is the square of its mean.
   [[nodiscard]] double total_variance() const noexcept { return variance + tail * tail; }
 };
 

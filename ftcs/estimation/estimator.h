@@ -37,7 +37,25 @@ struct RatePrior {
 
 /// Joint estimate of offset, rate and path delay of the free-running clock
 /// against the reference: the bank, its evidence, what is learnt about noise,
-/// and the detection of changes.
+/// and the detection of changes. Multiple-model adaptive estimation (Magill,
+/// IEEE Trans. AC-10, 1965); the parts and their sources: docs/adaptive-servo.md.
+///
+///     z = x + sign (d + n),   x += y t,   mean over models i under weights exp(-c_i / 2)
+///
+/// Units throughout: x, d in ns; y in ns per cycle; time in cycles of one sync
+/// interval; covariances in units of s^2, s = scale() the noise of one
+/// timestamp. The caller forms z and keeps |z| so small that a double resolves
+/// it (below 2^40 ns). One that is not finite breaks every filter: all is begun
+/// anew, and update() returns 0.
+///
+///     Estimator<FullGrid> estimator;
+///     const double credit = estimator.update({.sign = +1.0, .elapsed = 1.0, .z = z});
+///     estimator.estimate().x;          // ns, at the event of this message
+///     estimator.offset_sigma_ns(2.5);  // two and a half cycles later
+///
+/// The offset and the delay are told apart by messages of both directions
+/// alone; before, or with a known delay, d is held. A value: no heap, bounded
+/// work; kilobytes, to be made in place.
 template <class Grid>
 class Estimator {
  public:
@@ -60,11 +78,15 @@ class Estimator {
   /// It is known again. Before the first message only.
   void fix_delay() noexcept { delay_freed_ = false; }
 
-  /// Returns the probability that the message is no outlier.
+  /// One message, in the order in which they become known; seen.elapsed may be
+  /// negative. Returns the probability that the message is no outlier. Where it
+  /// gives up what it believed, count() is 0 afterwards: the caller may begin
+  /// with another base and give the same message again.
   double update(const Observation& seen) noexcept;
 
-  /// At the event of the last message; covariances in units of scale().
+  /// At the event of the last message; covariances in units of scale()^2.
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
+  /// s: noise of one timestamp, ns.
   [[nodiscard]] double scale() const noexcept { return scale_; }
   /// ln density that the best model gave the last message, outliers included.
   [[nodiscard]] double log_density() const noexcept { return static_cast<double>(said_); }
@@ -87,7 +109,9 @@ class Estimator {
   [[nodiscard]] KnownDelay known_delay() const noexcept {
     return delay_freed_ ? KnownDelay{} : known_delay_;
   }
+  /// Messages of both directions have come.
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
+  /// Messages since the last start.
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
   /// Gain of the last raw innovation on the offset: the effective p.
   [[nodiscard]] double gain() const noexcept { return static_cast<double>(gain_); }

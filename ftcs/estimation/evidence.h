@@ -12,11 +12,12 @@ namespace ftcs::estimation {
 
 /// What speaks for each model of a bank, the size s of the noise profiled out:
 ///
-///     c_i = W ln(V_i / W) + L_i,   V = sum of s^2 nu^2 / S,  L = sum of ln(S /
-///     s^2),  W messages
+///     c_i = W ln(V_i / W) + L_i
+///     V = sum of s^2 nu^2 / S,   L = sum of ln(S / s^2),   W messages
 ///
-/// c_i is minus twice the log-likelihood but for a constant. Messages count by
-/// their credit; the memory grows up to 4,000 of them.
+/// c_i is minus twice the log-likelihood but for a constant: the likelihood of
+/// normal innovations of variance k S / s^2, at the k = V / W that makes it
+/// largest. Messages count by their credit; the memory grows up to 4,000.
 template <class Grid>
 class Evidence {
  public:

@@ -17,9 +17,9 @@ namespace ftcs::estimation {
 /// a density with an atom. Of the messages of each direction a share w waits
 /// for nothing and is known to r ns; the others wait, and how long is learnt:
 ///
-///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)      nu > 0;    early: e / (10
-///     max(|nu|, 3 sqrt S)) for T credit c = w N / p;   slope c nu / S;
-///     curvature c / S
+///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)       nu > 0
+///             early (nu < 0) with e / (10 max(|nu|, 3 sqrt S)) in place of the waits
+///     credit c = w N / p,   slope c nu / S,   curvature c / S
 ///
 /// While w is not tiny this reaches the filter that knows which messages
 /// waited: near the floor T is flat and thin, so that a message there is

@@ -9,8 +9,7 @@ namespace ftcs::estimation {
 /// Density of the delay of one direction above its floor, as a fit of few
 /// messages can know it:
 ///
-///     p(nu) = w N(nu; 0, sigma^2) + (1 - w) (0.9 Exp(nu; tau) + 0.1 U(nu)) nu
-///     > 0
+///     p(nu) = w N(nu; 0, sigma^2) + (1 - w) (0.9 Exp(nu; tau) + 0.1 U(nu))      nu > 0
 ///
 /// w is the share of messages that wait for nothing, tau the mean wait of the
 /// others, U log-uniform over e^10. Early (nu < 0) there is 1e-4 U in place of
@@ -51,17 +50,16 @@ struct FloorFit {
 /// nothing lies before it.
 ///
 /// 1. Candidates for the rate: the edges of the lower convex hulls of both
-/// directions (Andrew,
-///    Inf. Proc. Letters 9, 1979; for clocks: Moon, Skelly and Towsley, INFOCOM
-///    1999).
+///    directions (Andrew, Inf. Proc. Letters 9, 1979; for clocks: Moon, Skelly
+///    and Towsley, INFOCOM 1999).
 /// 2. For each, the messages' heights above both touching lines, by octaves:
-/// the best likelihood
-///    of a share that lies evenly within a width, and waits beyond it.
+///    the best likelihood of a share that lies evenly within a width, and waits
+///    beyond it.
 /// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line,
-/// sigma, shares and
-///    mean wait under FloorNoise, from the best candidate.
+///    sigma, shares and mean wait under FloorNoise, from the best candidate.
 ///
-/// `least_noise`: no sigma is smaller, ns.
+/// `least_noise`: no sigma is smaller, ns. found is false where the windows
+/// hold too few messages, or no line is sharp enough.
 [[nodiscard]] FloorFit fit_floor(const PerDirection<RecordWindow>& windows,
                                  double least_noise) noexcept;
 

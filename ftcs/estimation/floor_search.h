@@ -16,7 +16,8 @@ namespace ftcs::estimation {
 ///
 /// Two records: every message, and one of every `stride`, where stride doubles
 /// while nothing is found, so that at least one of an entry's messages waited
-/// for nothing.
+/// for nothing: with a share w of those, 1 - (1 - w)^stride of the entries have
+/// one.
 class FloorSearch {
  public:
   using Record = FloorRecord<128>;

@@ -49,6 +49,7 @@ class IntervalMeter {
     trust();
     return factor;
   }
+  /// Above zero; one second until known.
   [[nodiscard]] double interval_ns() const noexcept { return interval_ns_; }
   /// Whether two messages of one direction are far enough apart to tell a rate:
   /// two Delay_Req a few milliseconds apart, one of them late, are no reason to

@@ -9,17 +9,23 @@ namespace ftcs::estimation {
 /// Two pictures of the same path, and the one that predicts better is believed:
 ///
 /// - every message is the delay and noise around it, outliers apart
-/// (Estimator);
+///   (Estimator);
 /// - some messages wait for nothing and all others are late by any amount
-/// (FloorEstimator), once a
-///   floor has been found.
+///   (FloorEstimator), once a floor has been found.
 ///
-/// The choice is a cumulative sum (Page) of ln [(w N + (1 - w)(q T + (1 - q)
-/// p)) / p] over the messages, p the density by the first picture, q the part
-/// of the waits that the learnt T explains better than p does: whether there is
-/// a floor where the second picture says is tested *beside* whatever the first
-/// predicts, so that the shapes of tails do not decide. w by a long and by a
-/// short memory, the better one: a load that changes must not cost the floor.
+/// The choice is a cumulative sum (Page) over the messages of
+///
+///     ln [(w N + (1 - w)(q T + (1 - q) p)) / p]
+///
+/// p the density by the first picture, w N and T the floor and the waits by the
+/// second, q the part of the waits that the learnt T explains better than p
+/// does: whether there is a floor where the second picture says is tested
+/// *beside* whatever the first predicts, so that the shapes of tails do not
+/// decide. w by a long and by a short memory, the better one: a load that
+/// changes must not cost the floor.
+///
+/// To the outside it is an Estimator, with the same functions and units; which
+/// picture answers is told by follows_floor() (decision 0020).
 template <class Grid>
 class LoadAwareEstimator {
  public:

@@ -29,6 +29,11 @@ template <std::size_t size>
 /// any model behind it. Random-walk FM by decades: the gain of a filter goes
 /// with b^(1/4), so that half a decade off costs below one per cent. White FM
 /// matters only above sqrt(b); there the gain goes with a^(1/2).
+///
+/// In the field's units, with noise s (ns) and a sync interval of T seconds:
+/// the Allan deviation of white FM at tau = T is sqrt(a) s / T ns/s, and the
+/// rate walks by sqrt(b) s / T ns/s from one interval to the next (NIST SP
+/// 1065, power laws of FM noise).
 struct FullGrid {
   static constexpr std::size_t kResidualWindow = 32;  ///< innovations behind the robust scale
   static constexpr std::size_t kNoiseWindow = 32;     ///< of the noise learner, per direction

@@ -18,6 +18,7 @@ namespace ftcs::estimation {
 /// of a frame as often as at its end.
 class WaitDensity {
  public:
+  /// Forgets what was learnt; mean_wait_ns above zero.
   void start(double mean_wait_ns) noexcept;
   /// A message that was late by nu > 0 ns and waited with the given
   /// probability.

@@ -56,8 +56,8 @@ struct PiGains {
 /// A PI servo that behaves as linuxptp's does (its documented behaviour; independent code), so that
 /// users can compare and change over without surprise. Offsets in ns, frequencies in ppb:
 ///
-///     frequency = kp offset + drift + ki offset;   drift += ki offset, unless the frequency is
-///     limited rate = 1 - frequency
+///     frequency = kp offset + drift + ki offset,   rate = 1 - frequency
+///     drift += ki offset, unless the frequency is limited
 ///
 /// s0 until two samples at least 0.016/ki s apart (at most 1000 s) have given a first frequency;
 /// then s1 (a step) or s2, according to the thresholds. Holds its rate until the next sample. The

@@ -14,8 +14,8 @@ struct KalmanNoise {
 /// Offset x (ns, free running minus reference), rate y (ns/s) and path delay d (ns) under fixed
 /// noise: the linear Kalman filter with
 ///
-///   x' = y + white FM,  y' = random-walk FM,  d' = 0;   z = x + g d + noise,  g = +1 forward, -1
-///   backward
+///     x' = y + white FM,   y' = random-walk FM,   d' = 0
+///     z = x + g d + noise,   g = +1 forward, -1 backward
 ///
 /// With a known delay (variance 0) it is the two-state filter. Process noise over an interval t
 /// (Brown and Hwang; one-dimensional constant-velocity model): Q_xx = w t + q t^3/3, Q_xy = q
