@@ -8,6 +8,7 @@
 
 namespace ftcs {
 
+/// The grid of triggers, on the steered clock, and that of the timer, on the unsteered one.
 struct CycleTimerConfig {
   LocalTime first;           ///< local time of the first trigger
   Nanoseconds cycle_time{};  ///< nominal length of a cycle, on the steered clock; above 0

@@ -33,6 +33,7 @@ class AddendRegister {
   ~AddendRegister() = default;
 };
 
+/// What the unit is set up with before a RegisterClock takes it over.
 struct RegisterClockConfig {
   std::uint32_t nominal_addend = 0;  ///< of rate 1; what remains of a fraction is the oscillator's
   std::uint32_t addend = 0;          ///< that the register holds

@@ -40,6 +40,7 @@ struct BusClockSample {
   std::int64_t offset_ns;  ///< what had been added to the system time offset when it was latched
 };
 
+/// How the bus stands to plant time.
 enum class BusClockState : std::uint8_t {
   kWaiting,    ///< no plant time yet
   kAcquiring,  ///< known, not yet within the band
@@ -48,6 +49,7 @@ enum class BusClockState : std::uint8_t {
 };
 [[nodiscard]] const char* name(BusClockState state) noexcept;
 
+/// What holds for the next frame. Until `known`, dc_to_plant and tracking mean nothing.
 struct BusClockDecision {
   BusClockState state = BusClockState::kWaiting;
   bool known = false;  ///< dc_to_plant means something

@@ -39,6 +39,8 @@ struct FreeCycleLaw {
   ServoUpdate update(const CyclePhase&, const ClockReading&) noexcept { return {}; }
   void reset() noexcept {}
 };
+/// One good sample in cycles_per_sync, as FTCS and PICS do it: a forward sample without a path
+/// delay, for the transit is taken off already.
 template <class Servo, std::uint32_t commands_to_rate>
 struct SampledCycleLaw {
   template <class Config>
@@ -50,6 +52,7 @@ struct SampledCycleLaw {
   void reset() noexcept { servo.reset(); }
   Servo servo;
 };
+/// Each cycle a backward message: the frame left here and was stamped at the reference.
 template <class Servo>
 struct MessageCycleLaw {
   explicit MessageCycleLaw(const AdaptiveConfig& config) noexcept : servo(config) {}

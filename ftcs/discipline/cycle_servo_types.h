@@ -115,6 +115,7 @@ struct CycleDecision {
   std::uint64_t skipped = 0;  ///< cycles that a stall passed over
 };
 
+/// Since construction, a cycle each but for the last two.
 struct CycleServoCounters {
   std::uint64_t cycles = 0;
   std::uint64_t used = 0;

@@ -24,6 +24,7 @@
 extern "C" {
 #endif
 
+/* How the bus stands to plant time. */
 enum ftcs_bus_state {
   FTCS_BUS_WAITING = 0, /* no plant time yet */
   FTCS_BUS_ACQUIRING = 1,
@@ -52,6 +53,7 @@ typedef struct ftcs_bus_config {
   int32_t steer;              /* 0: the offset is told, nothing is moved */
 } ftcs_bus_config;
 
+/* What one cycle told. */
 typedef struct ftcs_bus_sample {
   int32_t usable;    /* 1: all of it; 2: all but plant_ns, which is not known in this cycle; 0:
                         nothing, the frame was lost */
@@ -60,6 +62,7 @@ typedef struct ftcs_bus_sample {
   int64_t offset_ns; /* what had been added to 0x0920 when the system time was latched */
 } ftcs_bus_sample;
 
+/* What to write with the next frame, and how the bus stands. */
 typedef struct ftcs_bus_decision {
   int64_t offset_ns;      /* to be added to 0x0920, in total since the start, by the next frame */
   int64_t dc_to_plant_ns; /* at SYNC0, filtered; positive: the bus is ahead; if `known` */

@@ -59,6 +59,7 @@ enum ftcs_cycle_state {
   FTCS_CYCLE_COASTING = 3   /* was locked; no usable frame for coast_limit cycles */
 };
 
+/* What became of the last frame. */
 enum ftcs_cycle_verdict {
   FTCS_CYCLE_USED = 0,
   FTCS_CYCLE_LOST = 1,       /* has_reference was zero */
@@ -69,6 +70,7 @@ enum ftcs_cycle_verdict {
                                 fifth in a row is believed */
 };
 
+/* What ftcs_cycle_init() found wrong first. */
 enum ftcs_cycle_error {
   FTCS_CYCLE_OK = 0,
   FTCS_CYCLE_BAD_STORAGE = 1, /* header and library were built differently */

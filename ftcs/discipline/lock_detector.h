@@ -26,6 +26,7 @@ class LockDetector {
     return latch_.update(offset.ns(), config_.band, config_.dwell);
   }
   [[nodiscard]] bool locked() const noexcept { return latch_.closed(); }
+  /// Not locked; the next lock takes all of the dwell again.
   void reset() noexcept { latch_ = ConvergenceLatch{}; }
 
  private:

@@ -41,6 +41,8 @@ struct TimeBound {
   double bound_ns = 0.0;
   double growth = 0.0;
 
+  /// The best guess, and how far it may be wrong, ns, on either side. At `at` or later; before it
+  /// the width grows as well.
   [[nodiscard]] ReferenceTime time_at(FreeRunningTime instant) const noexcept {
     return time + scale(instant - at, rate);
   }

@@ -37,7 +37,9 @@ class FloorEstimator {
     bool waited = false;  ///< late, where waiting is usual
   };
 
+  /// No floor, and nothing recorded.
   void restart() noexcept;
+  /// As Estimator's.
   void expect_noise_of_at_least(double ns) noexcept { least_noise_ = ns; }
 
   /// `rate`: ns per cycle, believed elsewhere. Returns the probability that the
@@ -46,6 +48,7 @@ class FloorEstimator {
   /// Only remembers it.
   void record(const Observation& seen, double rate) noexcept;
 
+  /// A floor is followed; until then estimate() and the deviations mean nothing.
   [[nodiscard]] bool locked() const noexcept { return locked_; }
   /// The last message has made it start from a new floor.
   [[nodiscard]] bool adopted() const noexcept { return adopted_; }

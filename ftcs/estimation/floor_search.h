@@ -34,6 +34,7 @@ class FloorSearch {
   };
 
   void restart() noexcept;
+  /// Records a message, `elapsed` cycles after the last one.
   void hear(const Record::Message& message, double elapsed) noexcept;
   /// Something is late, or early: look soon, and at everything.
   void wake() noexcept;

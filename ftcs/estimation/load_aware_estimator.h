@@ -30,6 +30,7 @@ template <class Grid>
 class LoadAwareEstimator {
  public:
   explicit LoadAwareEstimator(const KnownDelay& delay = {}) noexcept : plain_(delay) {}
+  // As Estimator's, of the same names.
   void restart() noexcept {
     plain_.restart();
     forget_floor();

@@ -20,6 +20,8 @@ class MessageOrder {
  public:
   enum class Verdict : std::uint8_t { kNews, kDuplicate, kImplausible, kNewEpoch };
 
+  /// kDuplicate: older on both clocks, or the same; kImplausible: newer on one of them alone;
+  /// kNewEpoch: the third refused one that is newer than the refused ones before it.
   [[nodiscard]] Verdict judge(const TimestampPair& message) noexcept {
     const Stamps pair{message.reference.since_epoch().floor_ns(),
                       message.free_running.since_epoch().floor_ns()};

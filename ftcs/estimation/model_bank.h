@@ -138,6 +138,7 @@ class ModelBank {
     }
   }
 
+  /// What model i believes; i < kSize.
   [[nodiscard]] Estimate estimate(std::size_t i) const noexcept {
     return pack(i / kStep).lane(i % kStep);
   }

@@ -40,6 +40,7 @@ class NoiseLearner {
     body_mean_ += static_cast<float>(shift);
   }
 
+  /// variance() may be used, ns^2.
   [[nodiscard]] bool mature() const noexcept { return count_ >= kMature; }
   [[nodiscard]] double count() const noexcept { return count_; }
   [[nodiscard]] double variance() const noexcept { return variance_; }

@@ -11,6 +11,7 @@
 
 namespace ftcs {
 
+/// What is made of the last delays; ptp4l's delay_filter has the first one and a mean.
 enum class DelayFilterKind : std::uint8_t {
   kMovingMedian,   ///< robust against spikes of either sign; ptp4l's default
   kMovingMinimum,  ///< for queueing delays, which only ever add
@@ -43,6 +44,7 @@ class DelayFilter {
             config.length, config.kind == DelayFilterKind::kSteadyMean ? SteadyMean::kFewest : 1,
             kCapacity)) {}
 
+  /// The newest value; value() has heard it afterwards.
   constexpr void add(Duration value) noexcept {
     values_[next_] = value;
     next_ = (next_ + 1) % length_;

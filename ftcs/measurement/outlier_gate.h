@@ -27,6 +27,7 @@ enum class GateDecision : std::uint8_t {
           ///< start anew
 };
 
+/// Since construction; every decision is in one of them.
 struct GateCounters {
   std::uint64_t accepted = 0;
   std::uint64_t rejected = 0;

@@ -35,11 +35,13 @@ enum class PathDelayVerdict : std::uint8_t {
   kAbsurd,     ///< raw delay above PathDelayConfig::highest
 };
 
+/// The verdict on one backward message, and what it measured.
 struct PathDelayUpdate {
   PathDelayVerdict verdict = PathDelayVerdict::kUsed;
   Duration raw{};  ///< mean path delay of this exchange alone; zero unless computed
 };
 
+/// Since construction; reset() keeps them. A deferred message is counted when it is completed.
 struct PathDelayCounters {
   std::uint64_t used = 0;
   std::uint64_t negative = 0;

@@ -9,6 +9,7 @@ namespace ftcs {
 /// value is a median of the last few, as ptp4l's are.
 class OutlierChance {
  public:
+  /// That the next value is one; at least 0.005. It begins with a tenth.
   [[nodiscard]] constexpr double chance() const noexcept {
     return std::max({run_ > 0.0 ? again_ : 0.0, share_, kLeast});
   }

@@ -53,6 +53,7 @@ template <class Timescale>
   return mean_path_delay + delay_asymmetry;
 }
 
+/// What one exchange tells; the noise of four stamps is in it.
 struct PathEstimate {
   Duration offset;           ///< local minus reference at t2
   Duration mean_path_delay;  ///< without the asymmetry

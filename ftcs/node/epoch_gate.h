@@ -24,6 +24,7 @@ struct EpochRules {
   Nanoseconds largest_total_change{std::chrono::seconds{10}};
 };
 
+/// Whether a reading can be true, and if not, against what it speaks.
 enum class EpochVerdict : std::uint8_t {
   kPlausible,
   kTooEarly,       ///< before EpochRules::earliest_utc_s

@@ -69,6 +69,8 @@ class ReceiverNode {
   /// Inputs of ptp::TimeReceiver, which see. An input whose predecessor's events have not all been
   /// taken drops the rest of the actions: messages that are not sent.
   void start(FreeRunningTime now) noexcept;
+  /// Octets from the PTP header on, and when the message timestamp point passed the reference plane
+  /// of the interface (7.3.4), on the free-running oscillator.
   void on_event_message(std::span<const std::uint8_t> bytes, FreeRunningTime received,
                         FreeRunningTime now) noexcept;
   void on_general_message(std::span<const std::uint8_t> bytes, FreeRunningTime now) noexcept;

@@ -31,6 +31,7 @@ struct UtcMoment {
   std::optional<ListedUtc> listed{};
 };
 
+/// What holds where nobody tells.
 struct UtcRules {
   int utc_offset = 37;  ///< TAI - UTC since 2017: where neither reference nor list tells
   EpochRules epoch{};
@@ -45,6 +46,7 @@ enum class UtcRefusal : std::uint8_t {
   kFarFromSystem,       ///< EpochVerdict
 };
 
+/// What an operator may want to know; the fields that belong to a kind are named with it.
 enum class UtcNoteKind : std::uint8_t {
   kRefused,            ///< refusal; told once for each
   kTimescaleDoubted,   ///< an arbitrary timescale is announced: the old one is kept
@@ -60,6 +62,7 @@ enum class UtcNoteKind : std::uint8_t {
   kFollowedAgain,        ///< readings are plausible again
 };
 
+/// Fields that a kind does not name are zero.
 struct UtcNote {
   UtcNoteKind kind{};
   UtcRefusal refusal = UtcRefusal::kNothingKnown;
@@ -131,6 +134,7 @@ class UtcFollower {
     return refusal() && refused_until_ - refused_since_ >= kPatience;
   }
 
+  /// Oldest first; none: all is told. Beyond eight that are not taken, the newest are lost.
   [[nodiscard]] std::optional<UtcNote> next_note() noexcept;
 
  private:

@@ -52,6 +52,7 @@ class ForeignTransmitters {
   static constexpr Nanoseconds kDoubtTime{300'000'000'000};
   /// False: it is doubted already, or unknown.
   bool doubt(const PortIdentity& port, FreeRunningTime now) noexcept;
+  /// It must qualify anew.
   void forget(const PortIdentity& port) noexcept;
   void clear() noexcept { records_ = {}; }
 

@@ -29,6 +29,7 @@ struct ManagedPort {
   SubscribeEventsNp subscription{};  ///< of who asks
 };
 
+/// Since construction; every request is in one of them.
 struct ManagementCounters {
   std::uint64_t answered = 0;
   std::uint64_t refused = 0;    ///< answered with MANAGEMENT_ERROR_STATUS
@@ -44,7 +45,8 @@ struct ManagementCounters {
 class ManagementResponder {
  public:
   /// The RESPONSE to a GET, or a MANAGEMENT_ERROR_STATUS (15.5.4): kNoSuchId for what we do not
-  /// know, kNotSetable, kNotSupported. None: not for us, or no management message; counted.
+  /// know, kWrongValue for a port that we are not, kNotSetable for a SET, kNotSupported for a
+  /// COMMAND. None: not for us, or no management message; counted.
   [[nodiscard]] std::optional<ManagementBytes> answer(std::span<const std::uint8_t> request,
                                                       const ManagedPort& port) noexcept;
   /// Who wants to be told of what, where the request just answered has said so: linuxptp's phc2sys

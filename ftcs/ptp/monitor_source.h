@@ -10,6 +10,7 @@
 
 namespace ftcs::ptp {
 
+/// Since construction.
 struct MonitorCounters {
   std::uint64_t syncs = 0;                ///< samples handed on
   std::uint64_t delays = 0;               ///< samples handed on

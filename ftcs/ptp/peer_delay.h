@@ -11,11 +11,13 @@
 
 namespace ftcs::ptp {
 
+/// IEEE 1588-2019, 8.2.15.4.4: how the delay of the path is measured. Both ends must agree.
 enum class DelayMechanism : std::uint8_t {
   kEndToEnd,    ///< Delay_Req and Delay_Resp, 11.3
   kPeerToPeer,  ///< Pdelay_Req, Pdelay_Resp, Pdelay_Resp_Follow_Up, 11.4
 };
 
+/// How the neighbour is asked, and what is believed of its answers.
 struct PeerDelayConfig {
   std::int8_t log_min_interval = 0;  ///< logMinPdelayReqInterval, valid: -7 to 7
   /// Whether the neighbour must be capable (IEEE 802.1AS-2020, 11.2.2): that it answers, alone, and

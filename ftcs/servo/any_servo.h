@@ -42,6 +42,7 @@ enum class ServoKind : std::uint8_t {
   kExternal,  ///< from a shared library; has no name here, since nothing can make it but its loader
 };
 
+/// A kind and its name.
 struct ServoKindName {
   ServoKind kind;
   std::string_view name;

@@ -43,6 +43,7 @@ struct LinuxptpPiConfig {
 /// (negative), kRateLimits (limits, or max_frequency_ppb outside [0, 1e9)).
 [[nodiscard]] std::optional<ServoConfigError> validate(const LinuxptpPiConfig& config) noexcept;
 
+/// Gains for one interval. The loop of ppb and ns is stable for kp T < 2 and ki T < 4 - 2 kp T.
 struct PiGains {
   double proportional = 0.0;  ///< kp, 1/s: ppb of frequency per ns of offset
   double integral = 0.0;      ///< ki, 1/s per sample

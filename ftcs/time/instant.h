@@ -19,6 +19,7 @@ class Instant {
  public:
   constexpr Instant() noexcept = default;
   constexpr explicit Instant(Duration since_epoch) noexcept : since_epoch_(since_epoch) {}
+  /// Whole nanoseconds since the epoch.
   [[nodiscard]] static constexpr Instant from_ns(std::int64_t whole_ns) noexcept {
     return Instant{Duration::from_whole_ns(whole_ns)};
   }

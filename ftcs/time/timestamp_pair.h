@@ -7,6 +7,8 @@
 
 namespace ftcs {
 
+/// Which way a message went. Forward ones tell offset plus path delay, backward ones offset minus
+/// path delay: it takes both to know either.
 enum class Direction : std::uint8_t {
   kForward,   ///< reference to local, as Sync: reference = t1 + correction, local = t2
   kBackward,  ///< local to reference, as Delay_Req: local = t3, reference = t4 - correction

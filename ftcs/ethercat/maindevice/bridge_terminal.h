@@ -27,6 +27,7 @@ inline constexpr std::array<SdoDownload, 4> kObjects{{
     {{0x1C13, 0}, 1, 1},
 }};
 
+/// The terminal's process data.
 struct Inputs {
   bool updated = false;    ///< 0x10F4:0F, toggles with each new pair of stamps
   bool alone = false;      ///< 0x10F4:10, the other side is not connected to its segment

@@ -21,6 +21,7 @@ enum class AxisState : std::uint8_t { kDisabled, kEnabling, kEnabled, kFault };
 ///     target = origin + displacement    modulo 2^32 counts, once enabled
 class CspAxis {
  public:
+  /// What is asked of the axis in this cycle.
   struct Command {
     bool enable = false;
     bool reset_fault = false;

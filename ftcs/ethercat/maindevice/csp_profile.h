@@ -14,6 +14,7 @@ struct InterpolationPeriod {
   std::uint8_t mantissa = 0;
   std::int8_t exponent = -9;
 
+  /// 1 ms is 1e-3, 250 us is 25e-5; 123,456 ns cannot be written.
   [[nodiscard]] static constexpr InterpolationPeriod of(Nanoseconds cycle) noexcept {
     std::int64_t mantissa = cycle.count();
     int exponent = -9;

@@ -55,11 +55,13 @@ struct SubDeviceInfo {
   bool error = false;
   AlStatusCode code = AlStatusCode::kNoError;
 
+  /// It has a distributed clock; and one of 64 bits.
   [[nodiscard]] constexpr bool dc() const noexcept { return (features & reg::kFeatureDc) != 0; }
   [[nodiscard]] constexpr bool dc64() const noexcept { return (features & reg::kFeatureDc64) != 0; }
   [[nodiscard]] constexpr Target target(Command command, std::uint16_t offset) const noexcept {
     return {command, station, offset};
   }
+  /// What 0x0130 to 0x0135 hold.
   void set_al_status(ConstBytes six_bytes) noexcept {
     const auto status = load<std::uint16_t>(six_bytes, 0);
     state = static_cast<AlState>(status & kAlStateMask);

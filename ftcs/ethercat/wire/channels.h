@@ -85,6 +85,7 @@ struct SyncManagerChannel {
 struct DlStatus {
   std::uint16_t bits = 0;
 
+  /// There is a physical link at this port, 0 to 3.
   [[nodiscard]] constexpr bool link(unsigned port) const noexcept {
     return ((bits >> (4 + port)) & 1U) != 0;
   }
@@ -95,6 +96,7 @@ struct DlStatus {
   [[nodiscard]] constexpr bool communication(unsigned port) const noexcept {
     return ((bits >> (9 + 2 * port)) & 1U) != 0;
   }
+  /// The frame visits what hangs on this port.
   [[nodiscard]] constexpr bool open(unsigned port) const noexcept {
     return communication(port) && !loop_closed(port);
   }

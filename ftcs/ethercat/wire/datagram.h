@@ -80,9 +80,10 @@ struct Target {
 inline constexpr std::size_t kDatagramHeaderSize = 10;
 inline constexpr std::size_t kWorkingCounterSize = 2;
 inline constexpr std::size_t kDatagramOverhead = kDatagramHeaderSize + kWorkingCounterSize;
-inline constexpr std::uint16_t kLengthMask = 0x07FF;
-inline constexpr std::uint16_t kCirculatingFlag = 0x4000;
-inline constexpr std::uint16_t kMoreFollowsFlag = 0x8000;
+// Of the field of length and flags (5.3).
+inline constexpr std::uint16_t kLengthMask = 0x07FF;       ///< octets of data
+inline constexpr std::uint16_t kCirculatingFlag = 0x4000;  ///< has passed a closed loop once
+inline constexpr std::uint16_t kMoreFollowsFlag = 0x8000;  ///< another datagram in this frame
 
 /// One datagram inside a frame whose structure FrameView has checked (ETG.1000.4, 5.3):
 /// command 1, index 1, address 4, length and flags 2, event field 2, data, working counter 2.
@@ -106,12 +107,14 @@ class Datagram {
   [[nodiscard]] constexpr bool circulating() const noexcept {
     return (load<std::uint16_t>(bytes_, 6) & kCirculatingFlag) != 0;
   }
+  /// Events of all SubDevices that were passed, OR-ed (0x0210, as far as 0x0200 lets them).
   [[nodiscard]] constexpr std::uint16_t event() const noexcept {
     return load<std::uint16_t>(bytes_, 8);
   }
   [[nodiscard]] constexpr Bytes data() const noexcept {
     return bytes_.subspan(kDatagramHeaderSize, bytes_.size() - kDatagramOverhead);
   }
+  /// Zero when it is sent; see Command for what is added on the way.
   [[nodiscard]] constexpr std::uint16_t working_counter() const noexcept {
     return load<std::uint16_t>(bytes_, bytes_.size() - kWorkingCounterSize);
   }

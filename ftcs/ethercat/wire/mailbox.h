@@ -8,6 +8,7 @@
 
 namespace ftcs::ethercat {
 
+/// Why a mailbox holds no SDO that we understand.
 enum class MailboxError : std::uint8_t {
   kTooShort,           ///< less than a mailbox header, or than its length says
   kNotCoe,             ///< another protocol (EoE, FoE, mailbox error reply)
@@ -44,6 +45,7 @@ enum class SdoAbort : std::uint32_t {
 };
 [[nodiscard]] const char* name(SdoAbort abort) noexcept;
 
+/// Upload: the MainDevice reads the object; download: it writes it.
 enum class SdoKind : std::uint8_t {
   kUploadRequest,
   kUploadResponse,
@@ -52,6 +54,7 @@ enum class SdoKind : std::uint8_t {
   kAbort,
 };
 
+/// Of an entry in the object dictionary, written 0x1C32:02.
 struct ObjectAddress {
   std::uint16_t index = 0;
   std::uint8_t subindex = 0;

@@ -71,6 +71,7 @@ struct SiiContent {
   std::uint16_t assign_activate = 0;         ///< what to write to 0x0980 for distributed clocks
   std::array<char, kMaxName> device_name{};  ///< zero-terminated, printable ASCII
 
+  /// Objects can be read and written: it says so, and has both mailboxes.
   [[nodiscard]] constexpr bool coe() const noexcept {
     return (protocols & sii::kProtocolCoe) != 0 && receive.size > 0 && send.size > 0;
   }

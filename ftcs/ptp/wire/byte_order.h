@@ -57,6 +57,7 @@ class ByteWriter {
  public:
   explicit constexpr ByteWriter(std::span<std::uint8_t> bytes) noexcept : bytes_(bytes) {}
 
+  /// The lowest kOctets octets of the value, 1 to 8.
   template <std::size_t kOctets>
   constexpr void write(std::uint64_t value) noexcept {
     static_assert(kOctets <= sizeof(value));

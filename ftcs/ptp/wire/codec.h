@@ -24,6 +24,7 @@ enum class DecodeReason : std::uint8_t {
 };
 inline constexpr std::size_t kDecodeReasons = 7;
 
+/// "truncated": the enumerator's words in lower case.
 [[nodiscard]] std::string_view to_string(DecodeReason reason) noexcept;
 
 /// What was expected at which octet, and what stood there.
@@ -39,7 +40,12 @@ struct DecodeError {
 inline constexpr std::size_t kMaximumMessageSize = 1472;
 
 /// Bytes to message. Octets behind messageLength are padding and ignored (Annexes C to E); TLVs
-/// inside are checked and skipped (14.1). The result never refers to the bytes.
+/// inside are checked and skipped (14.1). The result never refers to the bytes. Any octets are
+/// borne, whoever sent them.
+///
+///     const auto message = decode(octets);
+///     if (!message) return to_string(message.error().reason);
+///     if (const auto* sync = std::get_if<Sync>(&message->body)) use(sync->origin);
 [[nodiscard]] Result<Message, DecodeError> decode(std::span<const std::uint8_t> bytes) noexcept;
 
 /// An encoded message; Announce with a path trace of one and Follow_Up with its information, the

@@ -24,22 +24,23 @@ enum class MessageType : std::uint8_t {
   kManagement = 0xD,
 };
 
+/// It is stamped when it leaves and when it arrives.
 [[nodiscard]] constexpr bool is_event(MessageType type) noexcept {
   return static_cast<std::uint8_t>(type) < 0x8;
 }
 
 /// flagField, 13.3.2.8, Table 37: the first octet is the upper byte here.
 namespace flag {
-inline constexpr std::uint16_t kAlternateTransmitter = 0x0100;
-inline constexpr std::uint16_t kTwoStep = 0x0200;
-inline constexpr std::uint16_t kUnicast = 0x0400;
-inline constexpr std::uint16_t kLeap61 = 0x0001;
-inline constexpr std::uint16_t kLeap59 = 0x0002;
-inline constexpr std::uint16_t kUtcOffsetValid = 0x0004;
-inline constexpr std::uint16_t kPtpTimescale = 0x0008;
-inline constexpr std::uint16_t kTimeTraceable = 0x0010;
-inline constexpr std::uint16_t kFrequencyTraceable = 0x0020;
-inline constexpr std::uint16_t kSynchronizationUncertain = 0x0040;
+inline constexpr std::uint16_t kAlternateTransmitter = 0x0100;      ///< 17.3: not to be followed
+inline constexpr std::uint16_t kTwoStep = 0x0200;                   ///< a Follow_Up has the time
+inline constexpr std::uint16_t kUnicast = 0x0400;                   ///< sent to one address
+inline constexpr std::uint16_t kLeap61 = 0x0001;                    ///< today ends with 23:59:60
+inline constexpr std::uint16_t kLeap59 = 0x0002;                    ///< today ends with 23:59:58
+inline constexpr std::uint16_t kUtcOffsetValid = 0x0004;            ///< currentUtcOffset is right
+inline constexpr std::uint16_t kPtpTimescale = 0x0008;              ///< TAI, else any epoch
+inline constexpr std::uint16_t kTimeTraceable = 0x0010;             ///< to a primary reference
+inline constexpr std::uint16_t kFrequencyTraceable = 0x0020;        ///< to a primary reference
+inline constexpr std::uint16_t kSynchronizationUncertain = 0x0040;  ///< its time is not sure (yet)
 }  // namespace flag
 
 /// logMessageInterval of messages that have none, and of unicast messages (13.3.2.14, Table 42).
@@ -110,6 +111,7 @@ struct FollowUpInformation {
   std::uint16_t gm_time_base_indicator = 0;
   Duration last_gm_phase_change{};  ///< of the last jump: time after it minus time before it
   std::int32_t scaled_last_gm_freq_change = 0;  ///< 2^-41
+  /// Rate of the grandmaster in units of the sender's clock, less 1.
   [[nodiscard]] constexpr double cumulative_rate_offset() const noexcept {
     constexpr double kUnit = 1.0 / 2199023255552.0;  // 2^-41
     return static_cast<double>(cumulative_scaled_rate_offset) * kUnit;

@@ -27,6 +27,7 @@ struct KalmanNoise {
 /// base, so that they begin small.
 class KalmanFilter {
  public:
+  /// At the event of the last message: ns, ns/s, ns.
   struct State {
     double x = 0.0;
     double y = 0.0;

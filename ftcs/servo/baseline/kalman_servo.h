@@ -10,6 +10,7 @@
 
 namespace ftcs {
 
+/// The noise has to be known; with a wrong one the filter is slow, or noisy, and says neither.
 struct KalmanConfig {
   Nanoseconds sync_interval{0};  ///< zero: one second
   baseline::KalmanNoise noise{};
