@@ -92,6 +92,10 @@ enum class CycleState : std::uint8_t {
 
 /// What became of the last sample; only kUsed reaches law and lock (kDoubtful the adaptive law too,
 /// which weighs for itself).
+///
+/// A single verdict other than kUsed does no harm: the cycle goes on at the last rate. Many of one
+/// kind are a set-up to be looked at: kLost the cable, kLate the host's scheduling, kSlow the
+/// network adapter, kImpossible a reference that somebody sets, kDoubtful the stamps.
 enum class CycleVerdict : std::uint8_t {
   kUsed,        ///< phase known
   kLost,        ///< no reference time

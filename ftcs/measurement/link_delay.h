@@ -24,6 +24,7 @@ class LinkDelay {
     filter_.add(mean_link_delay);
     return true;
   }
+  /// The link is down, or another: not known() until the next value.
   void reset() noexcept { filter_.reset(); }
   [[nodiscard]] bool known() const noexcept { return !filter_.empty(); }
   /// Filtered; zero until known.

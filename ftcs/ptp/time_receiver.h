@@ -82,6 +82,7 @@ class TimeReceiver {
  public:
   using Config = TimeReceiverConfig;
   using Stamp = FreeRunningTime;  ///< of event messages
+  /// In INITIALIZING. A security association is not owned and must outlive the receiver.
   explicit TimeReceiver(const Config& config) noexcept;
 
   /// INITIALIZING to LISTENING. Before, everything is ignored.
@@ -129,7 +130,8 @@ class TimeReceiver {
   /// What the neighbour at the other end of the link measured as; peer to peer only.
   [[nodiscard]] const PeerDelay& peer_delay() const noexcept { return peer_delay_; }
   /// Rate of the grandmaster in units of our oscillator by the Follow_Up information (802.1AS-2020,
-  /// 10.2.8.1.4); none where the transmitter sends none.
+  /// 10.2.8.1.4): (1 + cumulativeScaledRateOffset 2^-41) neighborRateRatio; none where the
+  /// transmitter sends none.
   [[nodiscard]] std::optional<Rate> grandmaster_rate_ratio() const noexcept;
   /// Its Sync interval, once a multicast Sync has told it.
   [[nodiscard]] std::optional<Duration> sync_interval() const noexcept { return sync_interval_; }

@@ -77,7 +77,7 @@ class FtcsServo {
   /// kUsed: a command, but for the first sample, which there is nothing to compare with.
   /// kDuplicate: newer on neither clock; nothing has changed. kImplausible: newer on one clock
   /// alone, or at a ratio outside plausible_ratio. Which of the two samples is wrong cannot be
-  /// known: all is begun anew from this one, and the next good one commands with p = 1.
+  /// known: all is begun anew from this one, and the next good one commands as the first did.
   ///
   /// A command that comes later than T_c / 2 after its sample takes T_c / 2 all the same, so that
   /// the rate never exceeds twice the one of a prompt command.
@@ -85,7 +85,8 @@ class FtcsServo {
   /// Takes a first sample without acting: k(n) needs no path delay, so that a message from before
   /// the delay was known still counts. No effect unless the servo is empty.
   void prime(const SyncSample& sample) noexcept;
-  /// Everything measured is void: the next command comes with the second sample and uses p = 1.
+  /// Everything measured is void: the next command comes with the second sample and uses p = 1
+  /// (converged_dwell 0: the p of the band).
   void reset() noexcept;
   /// As of the last sample: the perceived offset, the path delay it was given, k(n) a_l(n) as
   /// rate_ratio, and the p of the last command. No deviations: the law does not know its noise.

@@ -33,14 +33,23 @@ struct TwoWayConfig {
 ///     innovation = t1_a + r (t2 - t2_a) - t1        r: rate ratio of the last forward messages,
 ///                                                   a: last accepted message; positive: late
 ///
+/// A forward message passes, in this order:
+///
+///     is it news     newer than the last one on one clock at least, else kDuplicate
+///     the gate       once two messages have told the rate; kRejected, or the row's last: exit
+///     path delay     becomes the partner of backward messages near to it
+///     the law        origin, path delay, local and free-running stamp, as one SyncSample
+///
 /// The law is silent until a path delay is known: given, or measured by one exchange. Its first
 /// sample may then be the message before (prime()), so that FTCS commands with the first exchange
-/// and one more Sync.
+/// and one more Sync. Whether the message is a duplicate or impossible by its interval, the law
+/// judges again by its own rules.
 ///
 ///     TwoWayServo<FtcsServo> servo({.fixed_path_delay = 10us}, {.offset_gain = 1.0 / 8.0});
 template <ControlLaw Law>
 class TwoWayServo {
  public:
+  /// Valid: validate(law) finds nothing; not asked here.
   TwoWayServo(const TwoWayConfig& config, const typename Law::Config& law) noexcept
       : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
 
@@ -59,7 +68,8 @@ class TwoWayServo {
     has_latest_ = law_fed_ = false;
   }
 
-  /// The clock has been stepped by somebody else.
+  /// The clock has been stepped by somebody else, by so much (positive: ahead). Path delay and gate
+  /// live in free-running time and need not know.
   void on_step(Duration step) noexcept {
     if constexpr (requires { law_.on_step(step); }) law_.on_step(step);
   }

@@ -69,7 +69,7 @@ struct FrameStamps {
 enum class FrameOutcome : std::uint8_t {
   kIgnored,   ///< not the answer that was waited for: foreign, malformed, or late
   kProgress,  ///< ask for the next frame at once
-  kCycle,     ///< last_cycle() is new
+  kCycle,     ///< a cycle is over; last_cycle() is new, unless its frame was lost
   kStopped,   ///< nothing more to send; failure() says why
 };
 
