@@ -30,18 +30,18 @@ inline constexpr std::uint8_t kMaxMailboxCounter = 7;
 /// SDO abort codes (ETG.1000.6, 5.6.2.7.2).
 enum class SdoAbort : std::uint32_t {
   kNone = 0,
-  kUnknownCommand = 0x05040001,
-  kUnsupportedAccess = 0x06010000,
-  kWriteOnly = 0x06010001,
-  kReadOnly = 0x06010002,
-  kNoSuchObject = 0x06020000,
-  kCannotBeMapped = 0x06040041,
-  kMappingTooLong = 0x06040042,
-  kLengthMismatch = 0x06070010,
-  kNoSuchSubindex = 0x06090011,
+  kUnknownCommand = 0x05040001,     ///< the command byte of the SDO
+  kUnsupportedAccess = 0x06010000,  ///< as complete access where there is none
+  kWriteOnly = 0x06010001,          ///< it was read
+  kReadOnly = 0x06010002,           ///< it was written
+  kNoSuchObject = 0x06020000,       ///< index
+  kCannotBeMapped = 0x06040041,     ///< the object has no place in process data
+  kMappingTooLong = 0x06040042,     ///< more than the PDO holds
+  kLengthMismatch = 0x06070010,     ///< of the value
+  kNoSuchSubindex = 0x06090011,     ///< the index is there
   kValueOutOfRange = 0x06090030,
   kGeneral = 0x08000000,
-  kWrongState = 0x08000022,
+  kWrongState = 0x08000022,  ///< it can be written in another state alone, mostly PREOP
 };
 [[nodiscard]] const char* name(SdoAbort abort) noexcept;
 

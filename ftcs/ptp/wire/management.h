@@ -34,22 +34,22 @@ enum class ManagementId : std::uint16_t {
 
 /// actionField, 15.4.1.6.
 enum class ManagementAction : std::uint8_t {
-  kGet = 0,
-  kSet = 1,
-  kResponse = 2,
-  kCommand = 3,
-  kAcknowledge = 4,
+  kGet = 0,          ///< tell it
+  kSet = 1,          ///< change it
+  kResponse = 2,     ///< the answer to both
+  kCommand = 3,      ///< do it
+  kAcknowledge = 4,  ///< the answer to that
 };
 
 /// managementErrorId, 15.5.4.2.
 enum class ManagementError : std::uint16_t {
-  kResponseTooBig = 0x0001,
-  kNoSuchId = 0x0002,
-  kWrongLength = 0x0003,
-  kWrongValue = 0x0004,
-  kNotSetable = 0x0005,
-  kNotSupported = 0x0006,
-  kGeneral = 0xFFFE,
+  kResponseTooBig = 0x0001,  ///< the answer does not fit into one message
+  kNoSuchId = 0x0002,        ///< managementId is not known
+  kWrongLength = 0x0003,     ///< of the data
+  kWrongValue = 0x0004,      ///< in the data, or a port that is not there
+  kNotSetable = 0x0005,      ///< it can be read alone
+  kNotSupported = 0x0006,    ///< it is known, and the action is not
+  kGeneral = 0xFFFE,         ///< any other
 };
 
 /// 5.3.9 PTPText: a length octet and that many octets of UTF-8. Longer text is cut.
