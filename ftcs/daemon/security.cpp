@@ -2,13 +2,15 @@
 #include "ftcs/daemon/security.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
-#include <fstream>
+#include <system_error>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "ftcs/daemon/security_file.h"
+#include "ftcs/platform/durable_file.h"
 #include "ftcs/platform/os_error.h"
 
 namespace ftcs::daemon {
@@ -16,15 +18,19 @@ namespace {
 
 /// The content of a regular file that is not absurdly large.
 Result<std::vector<char>, std::string> read_text(const std::string& path) {
-  constexpr std::uintmax_t kLargest = 1 << 20;
-  std::error_code wrong;
-  if (!std::filesystem::is_regular_file(path, wrong)) {
-    return wrong ? wrong.message() : std::string("expected a regular file");
+  constexpr std::size_t kLargest = 1 << 20;
+  auto text = platform::read_regular(path, kLargest);
+  if (text) return std::move(*text);
+  switch (text.error()) {
+    case EINVAL:
+      return std::string("expected a regular file");
+    case EFBIG:
+      return std::string("more than 1 MiB");
+    case EACCES:
+      return std::string("cannot be read (its owner and root may; --user changes who asks)");
+    default:
+      return std::generic_category().message(text.error());
   }
-  if (std::filesystem::file_size(path, wrong) > kLargest) return std::string("more than 1 MiB");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::string("cannot be read (its owner and root may; --user changes who asks)");
-  return std::vector<char>(std::istreambuf_iterator<char>(file), {});
 }
 
 }  // namespace

@@ -107,8 +107,7 @@ Result<KeyLine, std::string> parse_key(const Words& words) {
   if (!id) return std::string("the id of a key: expected a number, 1 to 4294967295");
   const auto kind = platform::code_kind_from_name(words[1]);
   if (!kind) {
-    return fmt::format("key {}: type '{}': expected SHA256-128, SHA256, AES128 or AES256", *id,
-                       words[1]);
+    return fmt::format("key {}: its type: expected SHA256-128, SHA256, AES128 or AES256", *id);
   }
   auto key = key_from(words.back());
   if (!key || key->empty()) {
@@ -164,7 +163,7 @@ class Parser {
     if (words[0] == "seqnum_length" || words[0] == "res_length") {
       return set(words[0], words[1], 0, unused);
     }
-    return fmt::format("unknown setting '{}'", words[0]);
+    return "expected seqid_window, allow_mutable or a key: id type [length] value";
   }
   static Wrong key(const Words& words, AssociationLines& association) {
     auto key = parse_key(words);

@@ -71,11 +71,12 @@ TEST(SecurityFile, says_in_which_line_what_is_wrong) {
   EXPECT_EQ(wrong_with("spp 1\nseqid_window 32768"),
             "line 2: seqid_window: expected a number, 0 to 32767");
   EXPECT_EQ(wrong_with("spp 1\nres_length 4"), "line 2: res_length: expected a number, 0 to 0");
-  EXPECT_EQ(wrong_with("spp 1\nwindow 3"), "line 2: unknown setting 'window'");
+  EXPECT_EQ(wrong_with("spp 1\nwindow 3"),
+            "line 2: expected seqid_window, allow_mutable or a key: id type [length] value");
   EXPECT_EQ(wrong_with("spp 1\n0 SHA256 abc"),
             "line 2: the id of a key: expected a number, 1 to 4294967295");
   EXPECT_EQ(wrong_with("spp 1\n1 MD5 abc"),
-            "line 2: key 1: type 'MD5': expected SHA256-128, SHA256, AES128 or AES256");
+            "line 2: key 1: its type: expected SHA256-128, SHA256, AES128 or AES256");
   EXPECT_EQ(wrong_with("spp 1\n1 AES128 abc"), "line 2: key 1: has 3 octets, AES128 needs 16");
   EXPECT_EQ(wrong_with("spp 1\n1 SHA256 4 abc"), "line 2: key 1: has 3 octets, its length says 4");
   EXPECT_EQ(wrong_with("spp 1\n1 SHA256 abc\n1 SHA256 def"), "line 3: key 1 comes twice");
@@ -84,6 +85,12 @@ TEST(SecurityFile, says_in_which_line_what_is_wrong) {
 TEST(SecurityFile, repeats_no_key_in_an_error) {
   for (const char* key : {"HEX:5ecre", "HEX:5ecret", "B64:5ecret", "B64:5e!ret=="}) {
     const std::string wrong = wrong_with(std::string("spp 1\n1 SHA256 ") + key);
+    EXPECT_NE(wrong, "");
+    EXPECT_EQ(wrong.find("5e"), std::string::npos) << wrong;
+  }
+  // In the place of something else.
+  for (const char* line : {"HEX:5e 1", "1 HEX:5e SHA256", "1 HEX:5e 1 SHA256", "HEX:5e SHA256 1"}) {
+    const std::string wrong = wrong_with(std::string("spp 1\n") + line);
     EXPECT_NE(wrong, "");
     EXPECT_EQ(wrong.find("5e"), std::string::npos) << wrong;
   }

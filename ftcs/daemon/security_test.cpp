@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sys/stat.h>
 
 #include <gtest/gtest.h>
 
@@ -120,6 +121,36 @@ TEST_F(KeyFile, says_what_is_missing) {
             "sa_file " + path_ + "-none: No such file or directory");
   EXPECT_EQ(Security({testing::TempDir(), 1, 1}).load(),
             "sa_file " + testing::TempDir() + ": expected a regular file");
+}
+
+/// Read again in the loop that steers the clock: it waits for nothing.
+TEST_F(KeyFile, keeps_its_keys_when_something_else_takes_the_place_of_the_file) {
+  Security security(options());
+  ASSERT_EQ(security.load(), std::nullopt);
+  const auto still_knows_them = [&security] {
+    return ptp::authenticate(security.association(), hex(kOfPtp4l[0])) == Authenticity::kAuthentic;
+  };
+  const auto wrong_with = [this, &security](const std::string& what) {
+    const auto wrong = security.load();
+    return wrong == "sa_file " + path_ + ": " + what;
+  };
+  std::filesystem::remove(path_);
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  EXPECT_TRUE(wrong_with("expected a regular file"));
+  std::filesystem::remove(path_);
+  std::filesystem::create_directory(path_);
+  EXPECT_TRUE(wrong_with("expected a regular file"));
+  std::filesystem::remove(path_);
+  std::filesystem::create_symlink("/dev/zero", path_);
+  EXPECT_TRUE(wrong_with("expected a regular file"));
+  std::filesystem::remove(path_);
+  write(std::string((1 << 20) + 1, '#'));
+  EXPECT_TRUE(wrong_with("more than 1 MiB"));
+  write("");
+  EXPECT_TRUE(wrong_with("has no spp 1"));
+  write(std::string(kKeys).substr(0, 60));
+  EXPECT_NE(security.load(), std::nullopt);
+  EXPECT_TRUE(still_knows_them());
 }
 
 TEST_F(KeyFile, knows_whether_others_may_read_it) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/durable_file.h"
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <fcntl.h>
@@ -110,6 +112,27 @@ bool cut_to_nothing(std::FILE* file) {
   struct stat status {};
   if (::fstat(descriptor, &status) != 0) return false;
   return !S_ISREG(status.st_mode) || ::ftruncate(descriptor, 0) == 0;
+}
+
+Result<std::vector<char>, int> read_regular(const std::string& path, std::size_t largest) {
+  // Without O_NONBLOCK a pipe would be waited for until somebody writes to it.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return errno;
+  std::vector<char> content;
+  struct stat status {};
+  int code = ::fstat(descriptor, &status) != 0 ? errno : 0;
+  if (code == 0 && !S_ISREG(status.st_mode)) code = EINVAL;
+  ssize_t got = 1;
+  while (code == 0 && got > 0) {
+    std::array<char, 4096> piece{};
+    got = ::read(descriptor, piece.data(), piece.size());
+    if (got < 0) code = errno;
+    content.insert(content.end(), piece.begin(), piece.begin() + std::max<ssize_t>(got, 0));
+    if (content.size() > largest) code = EFBIG;
+  }
+  ::close(descriptor);
+  if (code != 0) return code;
+  return content;
 }
 
 }  // namespace ftcs::platform

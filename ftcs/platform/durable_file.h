@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "ftcs/time/result.h"
 
 namespace ftcs::platform {
 
@@ -24,5 +28,10 @@ enum class Readers : std::uint8_t { kOwner, kEverybody };
 /// A regular file that is open, whatever stands at its name by now; anything else stays as it is.
 /// False with errno: it could not be cut.
 [[nodiscard]] bool cut_to_nothing(std::FILE* file);
+
+/// What stands in the regular file `path` (a link to one will do); else errno: EINVAL where it is
+/// something else, EFBIG beyond `largest` octets. A pipe in its place is not waited for.
+[[nodiscard]] Result<std::vector<char>, int> read_regular(const std::string& path,
+                                                          std::size_t largest);
 
 }  // namespace ftcs::platform

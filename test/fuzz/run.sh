@@ -13,7 +13,7 @@ for target in $targets; do
   grown=build-fuzz/corpus/$target
   mkdir -p "$grown"
   echo "== $target, $seconds s"
-  build-fuzz/bin/"$target" -max_total_time="$seconds" -print_final_stats=1 -verbosity=0 \
+  build-fuzz/bin/"$target" -max_total_time="$seconds" -print_final_stats=1 -verbosity=0 -report_slow_units=300 \
     -artifact_prefix=build-fuzz/crashes/ "$grown" "test/fuzz/corpus/$target" 2>&1 |
     grep -E 'exec|ERROR|SUMMARY|artifact' || true
   # A pipe hides the exit code: what counts is whether a crash was written.
