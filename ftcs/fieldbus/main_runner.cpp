@@ -20,6 +20,8 @@ constexpr double kReplyShare = 0.8;
 /// Live lines on the terminal.
 constexpr Nanoseconds kLineInterval{1'000'000'000};
 
+/// Longer than another MainDevice waits for the answer of a drive without writing anything.
+constexpr Nanoseconds kListening{100'000'000};
 /// From the request to all drives in OP; a busy host may make them fault some times before.
 constexpr double kOpPatience_s = 30.0;
 /// Without --await-lock so long is waited for plant time.
@@ -39,6 +41,7 @@ node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
   };
   config.main.expected_subdevices = options.drives;
   config.main.take_over = options.take_over;
+  config.main.listening = kListening;
   config.main.retries = kRetries;
   config.main.lost_frame_limit = options.lost_frame_limit;
   config.main.scan_only = scan_only;

@@ -229,6 +229,7 @@ std::string describe(const ethercat::Failure& failure) {
                  : fmt::format("{} ({} octets, a frame holds {})", text, failure.received,
                                failure.expected);
     case FailureKind::kInOperation:
+    case FailureKind::kInUse:
       return text + " (stop it, or take them over with --take-over)";
     case FailureKind::kBadSii:
       return fmt::format("{} ({})", text, ethercat::name(failure.sii));

@@ -25,8 +25,10 @@ class MainBench : public WireBench {
   [[nodiscard]] MainDevice& main() { return *main_; }
 
   /// Sends one frame now; false if it was lost. `lose` decides about each frame by its number.
-  bool exchange_once() {
-    const ConstBytes frame = main_->next_frame();
+  bool exchange_once() { return exchange_once(*main_); }
+  /// The same of another MainDevice on this wire.
+  bool exchange_once(MainDevice& main) {
+    const ConstBytes frame = main.next_frame();
     if (frame.empty()) return false;
     std::array<std::uint8_t, kMaxFrameSize> buffer{};
     std::copy(frame.begin(), frame.end(), buffer.begin());
@@ -36,7 +38,7 @@ class MainBench : public WireBench {
     EXPECT_TRUE(view);
     const auto passage = lost ? Segment::Passage{} : segment().pass(*view, now());
     if (!passage.returned) {
-      main_->on_timeout();
+      main.on_timeout();
       return false;
     }
     if (tamper) tamper(*view);
@@ -44,7 +46,7 @@ class MainBench : public WireBench {
     FrameStamps stamps{now_of_master(), relabel<FreeRunningTime>(passage.at)};
     stamps.has_system_time = plant_time;
     stamps.system_time = relabel<ReferenceTime>(stamps.sent);
-    main_->on_frame(Bytes{buffer}.first(frame.size()), stamps);
+    main.on_frame(Bytes{buffer}.first(frame.size()), stamps);
     return true;
   }
   /// Until the cyclic stage or the end.

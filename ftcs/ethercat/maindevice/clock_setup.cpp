@@ -13,6 +13,14 @@ void ClockSetup::start(const ClockSetupConfig& config) noexcept {
   pulses_left_ = config.drift_pulses;
 }
 
+void add_drift(FrameWriter& writer, const Network& network) noexcept {
+  const SubDeviceInfo& reference = network.devices[network.reference];
+  writer.add(reference.target(Command::kFrmw, reg::kSystemTime), 8);
+  constexpr std::size_t kStamp = 4;
+  if (writer.room() < kDatagramOverhead + kStamp) return;
+  writer.add(reference.target(Command::kFpwr, reg::kReceiveTimePort0), kStamp);
+}
+
 void ClockSetup::request(FrameWriter& writer, const Network& network) noexcept {
   using enum Command;
   const SubDeviceInfo& device = network.devices[device_];
@@ -32,7 +40,7 @@ void ClockSetup::request(FrameWriter& writer, const Network& network) noexcept {
       break;
     }
     case Step::kDrift:
-      writer.add(network.devices[network.reference].target(kFrmw, reg::kSystemTime), 8);
+      add_drift(writer, network);
       break;
   }
 }

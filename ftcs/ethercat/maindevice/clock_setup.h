@@ -17,6 +17,11 @@ struct ClockSetupConfig {
   Nanoseconds processing_excess{0};
 };
 
+/// Appends the datagram that keeps the clocks together during the bring-up, and, where there is
+/// room, one that makes the reference stamp this frame: so that another MainDevice sees that one is
+/// at work, whatever else is being waited for.
+void add_drift(FrameWriter& writer, const Network& network) noexcept;
+
 /// Initialises the distributed clocks: latch, receive times, delays, offsets, drift.
 ///
 /// The reference's system time becomes what the MainDevice's clock showed when it sent the latching

@@ -51,6 +51,8 @@ const char* name(FailureKind kind) noexcept {
       return "SII stays busy";
     case FailureKind::kInOperation:
       return "SubDevices are in OP already: another MainDevice drives them";
+    case FailureKind::kInUse:
+      return "somebody else configures the SubDevices: another MainDevice is at work";
     case FailureKind::kMailboxUnusable:
       return "mailbox of unusable size";
     case FailureKind::kBringUpTimeout:

@@ -20,7 +20,8 @@ enum class FailureKind : std::uint8_t {
   kImpossibleTopology,   ///< the ports that are open do not form a tree of what was counted
   kBadSii,               ///< sii tells what is wrong
   kSiiTimeout,
-  kInOperation,      ///< somebody is in OP before the scan: another MainDevice drives them
+  kInOperation,  ///< somebody is in OP before the scan: another MainDevice drives them
+  kInUse,        ///< registers change before anything was written: another MainDevice is at work
   kMailboxUnusable,  ///< size of a mailbox: too small for an SDO or too large for a frame
   kBringUpTimeout,   ///< every answer came in time, and there was no end of them
   kFrameTooLarge,    ///< what is to be sent does not fit into one frame

@@ -30,7 +30,8 @@ const char* name(Stage stage) noexcept {
 }
 
 MainDevice::MainDevice(const MainDeviceConfig& config) noexcept : config_(config) {
-  scanner_.start(config.expected_subdevices, config.sii_timeout, config.take_over);
+  scanner_.start(config.expected_subdevices, config.sii_timeout, config.take_over,
+                 config.listening);
 }
 
 ConstBytes MainDevice::next_frame() noexcept {
@@ -75,8 +76,7 @@ void MainDevice::write_frame(FrameWriter& writer) noexcept {
       configurator_.request(writer, network_);
       // The clocks must not drift apart while the rest is being configured.
       if (clocks_wanted() && !configurator_.aligning()) {
-        writer.add(network_.devices[network_.reference].target(Command::kFrmw, reg::kSystemTime),
-                   8);
+        add_drift(writer, network_);
       }
       return;
     case Stage::kCyclic:

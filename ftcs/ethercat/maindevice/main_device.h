@@ -38,8 +38,11 @@ struct MainDeviceConfig {
   /// For the whole of the bring-up: SubDevices that always have an answer and never the right one
   /// could keep it busy for ever.
   Nanoseconds bring_up_timeout{60'000'000'000};
-  /// Reset SubDevices that are in OP, which another MainDevice drives.
+  /// Reset SubDevices that are in OP, which another MainDevice drives, or that another works on.
   bool take_over = false;
+  /// So long is looked, before anything is written, for another MainDevice that brings SubDevices
+  /// up or runs them below OP. Zero: not at all, as in simulations.
+  Nanoseconds listening{0};
   /// So long the way down is repeated until nobody is in OP any more.
   Nanoseconds stop_timeout{200'000'000};
 };

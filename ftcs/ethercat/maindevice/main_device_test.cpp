@@ -295,6 +295,47 @@ TEST(MainDevice, drives_in_op_are_left_to_the_one_who_drives_them_unless_told_ot
   }
 }
 
+/// A second one comes when the first has sent `frames`; it has this wire for itself 100 ms long
+/// only if the first is silent.
+void come_second(std::size_t drives, int frames, bool first_goes_on) {
+  SCOPED_TRACE(testing::Message() << drives << " drives, after " << frames << " frames");
+  MainBench bench(csp_config());
+  add_drives(bench, static_cast<int>(drives));
+  for (int i = 0; i < frames; ++i) {
+    bench.exchange_once();
+    bench.wait(Nanoseconds{20'000});
+  }
+  MainDeviceConfig config = csp_config();
+  config.listening = Nanoseconds{100'000'000};
+  const auto second = std::make_unique<MainDevice>(config);
+  while (!second->cyclic() && second->stage() != Stage::kStopped) {
+    bench.exchange_once(*second);
+    bench.wait(Nanoseconds{20'000});
+    if (!first_goes_on) continue;
+    bench.exchange_once();
+    bench.wait(Nanoseconds{20'000});
+  }
+  EXPECT_EQ(second->cyclic(), !first_goes_on);
+  if (!first_goes_on) return;
+  EXPECT_EQ(second->failure().kind, FailureKind::kInUse) << name(second->failure().kind);
+  to_op(bench);
+}
+
+TEST(MainDevice, a_second_one_finds_out_that_a_bring_up_is_under_way_and_disturbs_nothing) {
+  for (const std::size_t drives : {1U, 2U, 8U}) {
+    MainBench alone(csp_config());
+    add_drives(alone, static_cast<int>(drives));
+    int frames = 0;
+    for (; !alone.main().cyclic(); ++frames) {
+      alone.exchange_once();
+      alone.wait(Nanoseconds{20'000});
+    }
+    for (int n = 2; n < frames; n += 1 + frames / 12) come_second(drives, n, true);
+    if (drives > 1) come_second(drives, frames + 100, true);  // cyclic, in SAFEOP
+    come_second(drives, frames / 2, false);
+  }
+}
+
 TEST(MainDevice, a_stop_is_over_when_everybody_was_seen_out_of_op) {
   MainBench bench(csp_config());
   add_drives(bench, 3);

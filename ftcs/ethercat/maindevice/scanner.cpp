@@ -9,10 +9,31 @@ namespace {
 constexpr std::uint16_t kResetToInit = 0x0011;  // INIT, and acknowledge any error
 constexpr std::size_t kIdentitySize = 10;
 constexpr std::size_t kAlStatusSize = 6;
+
+/// What a MainDevice at work changes: states, the reading of the SII, channels, mailboxes that
+/// fill, receive stamps, offsets, and what the clocks make of each time that is told to them.
+struct Registers {
+  std::uint16_t offset;
+  std::size_t size;
+};
+constexpr Registers kWatched[] = {{reg::kStationAddress, 2},
+                                  {reg::kAlControl, 2},
+                                  {reg::kAlStatus, 2},
+                                  {reg::kSiiControl, 14},
+                                  {reg::kFmmu, 2 * reg::kFmmuSize},
+                                  {reg::kSyncManager, 4 * reg::kSyncManagerSize},
+                                  {reg::kReceiveTimePort0, 4},
+                                  {reg::kSystemTimeOffset, 16},
+                                  {reg::kSpeedCounterStart, 6},
+                                  {reg::kCyclicUnitControl, 2},
+                                  {reg::kSync0CycleTime, 4}};
 }  // namespace
 
-void Scanner::start(std::size_t expected, Nanoseconds timeout, bool take_over) noexcept {
+void Scanner::start(std::size_t expected, Nanoseconds timeout, bool take_over,
+                    Nanoseconds listening) noexcept {
   take_over_ = take_over;
+  listening_ = listening;
+  image_used_ = 0;
   step_ = Step::kCount;
   expected_ = expected;
   timeout_ = timeout;
@@ -45,6 +66,9 @@ void Scanner::request(FrameWriter& writer, const Network& network) noexcept {
       writer.add({kBrd, 0, reg::kType}, 2);
       writer.add({kBrd, 0, reg::kAlStatus}, 2);
       break;
+    case Step::kListen:
+      for (const Registers& watched : kWatched) writer.add({kBrd, 0, watched.offset}, watched.size);
+      break;
     case Step::kReset:
       write_reset(writer);
       break;
@@ -71,6 +95,8 @@ Progress Scanner::reply(const FrameView& frame, Network& network, FreeRunningTim
   switch (step_) {
     case Step::kCount:
       return count(frame, network, failure);
+    case Step::kListen:
+      return listen(frame, now, failure);
     case Step::kReset:
       step_ = Step::kAddress;
       return Progress::kContinue;
@@ -108,7 +134,25 @@ Progress Scanner::count(const FrameView& frame, Network& network, Failure& failu
     network.devices[n] = SubDeviceInfo{};
     network.devices[n].station = static_cast<std::uint16_t>(kFirstStation + n);
   }
-  step_ = Step::kReset;
+  step_ = take_over_ || listening_ == Nanoseconds{0} ? Step::kReset : Step::kListen;
+  return Progress::kContinue;
+}
+
+/// What was read first stands in image_.
+Progress Scanner::listen(const FrameView& frame, FreeRunningTime now, Failure& failure) noexcept {
+  std::size_t at = 0;
+  const bool first = image_used_ == 0;
+  for (const Datagram datagram : frame) {
+    const Bytes known = Bytes{image_}.subspan(at, datagram.data().size());
+    at += known.size();
+    if (first) std::copy(datagram.data().begin(), datagram.data().end(), known.begin());
+    if (!std::equal(known.begin(), known.end(), datagram.data().begin())) {
+      return fail(failure, {.kind = FailureKind::kInUse});
+    }
+  }
+  image_used_ = at;
+  if (first) deadline_ = now + listening_;
+  if (now >= deadline_) step_ = Step::kReset;
   return Progress::kContinue;
 }
 

@@ -10,20 +10,29 @@
 
 namespace ftcs::ethercat {
 
-/// Finds out what is there: counts, resets to INIT, gives station addresses, reads identity, links
-/// and SII, and resolves the topology. SubDevices of one product share one reading of the SII.
+/// Finds out what is there: counts, listens, resets to INIT, gives station addresses, reads
+/// identity, links and SII, and resolves the topology. SubDevices of one product share one reading
+/// of the SII.
+///
+/// No frame of another MainDevice need come here. That one is at work shows in what it writes:
+/// before anything is written, the registers that a bring-up and a cycle change are read again and
+/// again; a change of them is somebody else's.
 class Scanner {
  public:
   /// `expected`: how many there must be at least; zero: any number.
-  /// `take_over`: also from SubDevices that are in OP.
-  void start(std::size_t expected, Nanoseconds timeout, bool take_over) noexcept;
+  /// `take_over`: also from SubDevices that are in OP, and from whoever works on them.
+  /// `listening`: so long is looked for another MainDevice; zero: not at all.
+  void start(std::size_t expected, Nanoseconds timeout, bool take_over,
+             Nanoseconds listening) noexcept;
   void request(FrameWriter& writer, const Network& network) noexcept;
   [[nodiscard]] Progress reply(const FrameView& frame, Network& network, FreeRunningTime now,
                                Failure& failure) noexcept;
 
  private:
-  enum class Step : std::uint8_t { kCount, kReset, kAddress, kIdentify, kReadSii };
+  enum class Step : std::uint8_t { kCount, kListen, kReset, kAddress, kIdentify, kReadSii };
   [[nodiscard]] Progress count(const FrameView& frame, Network& network, Failure& failure) noexcept;
+  [[nodiscard]] Progress listen(const FrameView& frame, FreeRunningTime now,
+                                Failure& failure) noexcept;
   [[nodiscard]] Progress addressed(const FrameView& frame, Network& network,
                                    Failure& failure) noexcept;
   [[nodiscard]] Progress identify(const FrameView& frame, Network& network, FreeRunningTime now,
@@ -47,6 +56,7 @@ class Scanner {
   std::size_t expected_ = 0;
   bool take_over_ = false;
   Nanoseconds timeout_{};
+  Nanoseconds listening_{};
   std::size_t device_ = 0;
   FreeRunningTime deadline_;
   bool deadline_set_ = false;

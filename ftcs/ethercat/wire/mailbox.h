@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <compare>
 #include <cstdint>
 
 #include "ftcs/ethercat/wire/bytes.h"
@@ -58,7 +59,7 @@ enum class SdoKind : std::uint8_t {
 struct ObjectAddress {
   std::uint16_t index = 0;
   std::uint8_t subindex = 0;
-  friend constexpr bool operator==(ObjectAddress, ObjectAddress) noexcept = default;
+  friend constexpr auto operator<=>(ObjectAddress, ObjectAddress) noexcept = default;
 };
 
 /// A service data object of CAN application protocol over EtherCAT, expedited or normal in one

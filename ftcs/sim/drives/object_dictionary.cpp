@@ -163,6 +163,13 @@ constexpr ObjectEntry kBridgeEntries[] = {
 };
 static_assert(std::size(kDriveEntries) <= ObjectDictionary::kCapacity);
 static_assert(std::size(kBridgeEntries) <= ObjectDictionary::kCapacity);
+
+/// They are searched by halves.
+constexpr ObjectAddress address_of(const ObjectEntry& entry) {
+  return {entry.index, entry.subindex};
+}
+static_assert(std::ranges::is_sorted(kDriveEntries, {}, address_of));
+static_assert(std::ranges::is_sorted(kBridgeEntries, {}, address_of));
 constexpr std::size_t kNotFound = ObjectDictionary::kCapacity;
 
 constexpr std::size_t kMaxAssigned = 1;
@@ -194,10 +201,9 @@ ObjectDictionary::ObjectDictionary(const Identity& identity, DeviceKind kind) no
 }
 
 std::size_t ObjectDictionary::find(ObjectAddress object) const noexcept {
-  for (std::size_t i = 0; i < entries_.size(); ++i) {
-    if (entries_[i].index == object.index && entries_[i].subindex == object.subindex) return i;
-  }
-  return kNotFound;
+  const auto entry = std::ranges::lower_bound(entries_, object, {}, address_of);
+  if (entry == entries_.end() || address_of(*entry) != object) return kNotFound;
+  return static_cast<std::size_t>(entry - entries_.begin());
 }
 
 bool ObjectDictionary::has_index(std::uint16_t index) const noexcept {
