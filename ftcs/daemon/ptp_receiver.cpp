@@ -9,6 +9,7 @@
 #include "ftcs/daemon/port_config.h"
 #include "ftcs/daemon/status_report.h"
 #include "ftcs/daemon/watch/follower_watch.h"
+#include "ftcs/ptp/random.h"
 
 namespace ftcs::daemon {
 
@@ -26,6 +27,8 @@ node::ReceiverNodeConfig receiver_node_config(const PtpOptions& options, const P
   config.fast_start = options.fast_start;
   config.delay_asymmetry = options.delay_asymmetry;
   config.seed = seed;
+  config.first_request_id = static_cast<std::uint16_t>(0x1p16 * ptp::Random(seed).uniform());
+  config.peer_delay.first_request_id = config.first_request_id;
   return node;
 }
 

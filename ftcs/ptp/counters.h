@@ -77,6 +77,8 @@ enum class Counter : std::uint8_t {
                       ///< forgotten
   kLostFollowUp,      ///< a two-step Sync whose Follow_Up did not come in time: forgotten
   kLostSync,          ///< a Follow_Up whose Sync did not come in time: forgotten
+  // Requests of others.
+  kAnswersRefused,  ///< beyond what one sender is answered (AnswerLimit): dropped
   // Delay request and response.
   kStaleDelayResp,  ///< nothing outstanding with this sequence id (late, duplicate or forged):
                     ///< dropped

@@ -9,8 +9,10 @@
 
 namespace ftcs::ptp {
 
-DelayRequests::DelayRequests(std::int8_t log_interval, std::uint64_t seed) noexcept
-    : interval_(interval_from_log(log_interval).value_or(Duration{std::chrono::seconds{1}})),
+DelayRequests::DelayRequests(std::int8_t log_interval, std::uint64_t seed,
+                             std::uint16_t first_id) noexcept
+    : next_id_(first_id),
+      interval_(interval_from_log(log_interval).value_or(Duration{std::chrono::seconds{1}})),
       random_(seed) {}
 
 void DelayRequests::start(FreeRunningTime now) noexcept {

@@ -34,7 +34,8 @@ ReferenceTime on_wire(FreeRunningTime time) noexcept { return relabel<ReferenceT
 PeerDelay::PeerDelay(const PeerDelayConfig& config) noexcept
     : config_(config),
       interval_(
-          interval_from_log(config.log_min_interval).value_or(Duration{std::chrono::seconds{1}})) {}
+          interval_from_log(config.log_min_interval).value_or(Duration{std::chrono::seconds{1}})),
+      next_id_(config.first_request_id) {}
 
 void PeerDelay::start(FreeRunningTime now) noexcept {
   stop();
@@ -112,6 +113,7 @@ void PeerDelay::on_request(const Header& header, FreeRunningTime received, Port&
   if (std::ranges::any_of(answers_, [&](const Answer& a) { return a.known && a.id == id; })) {
     return port.count(Counter::kDuplicatePdelayReq);
   }
+  if (!answer_limit_.admits(header.source, received)) return port.count(Counter::kAnswersRefused);
   port.count(Counter::kPdelayReqReceived);
   Message message{port.header(header.sequence_id, kNoLogInterval),
                   PdelayResp{on_wire(received), header.source}};

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/answer_limit.h"
 #include "ftcs/ptp/port.h"
 
 namespace ftcs::ptp {
@@ -28,6 +29,7 @@ struct PeerDelayConfig {
   std::uint8_t allowed_losses = 9;  ///< allowedLostResponses, 802.1AS-2020, 11.5.3
   /// Of the way to us over the mean (7.4.2); the mean link delay is without it, the stamps are not.
   Duration asymmetry{};
+  std::uint16_t first_request_id = 0;  ///< see TimeReceiverConfig
 };
 
 /// A mean link delay beyond this is nonsense, whatever the link.
@@ -117,6 +119,8 @@ class PeerDelay {
   };
   static constexpr std::size_t kOpenAnswers = 4;
   static constexpr std::size_t kInstants = 8;
+  /// A link has one other end; more, so that what is no link between two ports is found out.
+  static constexpr std::size_t kNeighbours = 4;
 
   void on_request(const Header& header, FreeRunningTime received, Port& port,
                   ActionList& actions) noexcept;
@@ -142,6 +146,7 @@ class PeerDelay {
   Exchange exchange_{};
   std::array<Answer, kOpenAnswers> answers_{};
   std::size_t next_answer_ = 0;
+  AnswerLimit<kNeighbours> answer_limit_{};
 
   std::array<Instant, kInstants> instants_{};
   std::size_t instant_count_ = 0;

@@ -399,6 +399,26 @@ TEST_F(PeerDelayTest, a_copy_of_a_request_is_answered_once) {
   EXPECT_EQ(of<SendMessage>(hand_over(message(6, PdelayReq{}), 2s)).size(), 1U);
 }
 
+TEST_F(PeerDelayTest, a_flood_of_requests_takes_no_answers_from_the_neighbour) {
+  std::size_t answers = 0;
+  std::size_t answers_to_flood = 0;
+  for (unsigned i = 0; i < 50'000; ++i) {
+    const Nanoseconds now = i * 100us;
+    // By 1,000 names, or by one.
+    PortIdentity forged = kStranger;
+    if (i % 2 == 0) forged.port = static_cast<std::uint16_t>(i % 1000);
+    const bool true_one = i % 125 == 0;
+    const auto request =
+        message(static_cast<std::uint16_t>(i), PdelayReq{}, true_one ? kNeighbour : forged);
+    const auto sent = of<SendMessage>(hand_over(request, now));
+    (true_one ? answers : answers_to_flood) += sent.size();
+  }
+  EXPECT_EQ(answers, 400U);
+  EXPECT_GT(answers_to_flood, 256U);
+  EXPECT_LE(answers_to_flood, 6U * (3U * 256U + 1024U));
+  EXPECT_EQ(count(Counter::kAnswersRefused) + answers + answers_to_flood, 50'000U);
+}
+
 TEST_F(PeerDelayTest, of_two_answers_with_different_stamps_none_counts) {
   const auto id = ask(0s);
   static_cast<void>(stamp(id, 0s));

@@ -37,7 +37,7 @@ TimeReceiver::TimeReceiver(const Config& config) noexcept
     : config_(config),
       port_(port_config(config)),
       peer_delay_(peer_delay_config(config)),
-      delay_requests_(config.log_min_delay_req_interval, config.seed) {}
+      delay_requests_(config.log_min_delay_req_interval, config.seed, config.first_request_id) {}
 
 ActionList TimeReceiver::start(FreeRunningTime now) noexcept {
   ActionList actions;

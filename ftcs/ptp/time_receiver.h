@@ -51,6 +51,9 @@ struct TimeReceiverConfig {
   /// pairs' reference (11.6.2, 11.6.3); leave it zero where the measurement layer is given it.
   Duration delay_asymmetry{};
   std::uint64_t seed = 1;  ///< of the Delay_Req intervals; give each receiver another one
+  /// Sequence id of the first Delay_Req. Where it is another one after each start, recorded
+  /// answers, authentic though they are, answer nothing.
+  std::uint16_t first_request_id = 0;
 };
 
 /// A correctionField beyond this is refused: no network holds a message for a second.

@@ -176,6 +176,9 @@ void TimeTransmitter::dispatch(const Message& message, std::optional<ReferenceTi
 /// correction).
 void TimeTransmitter::answer(const Header& request, ReferenceTime received,
                              ActionList& actions) noexcept {
+  if (!answer_limit_.admits(request.source, event_clock(received))) {
+    return port_.count(Counter::kAnswersRefused);
+  }
   port_.count(Counter::kDelayReqReceived);
   const bool unicast = request.has(flag::kUnicast);
   Message message{port_.header(request.sequence_id, config_.log_min_delay_req_interval),

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "ftcs/ptp/actions.h"
+#include "ftcs/ptp/answer_limit.h"
 #include "ftcs/ptp/peer_delay.h"
 #include "ftcs/ptp/port.h"
 
@@ -84,6 +85,8 @@ class TimeTransmitter {
   };
   /// Transmit stamps may lag behind by as many Syncs.
   static constexpr std::size_t kOpenSyncs = 4;
+  /// Receivers with a share of their own of the answers.
+  static constexpr std::size_t kReceivers = 64;
 
   void dispatch(const Message& message, std::optional<ReferenceTime> received,
                 ActionList& actions) noexcept;
@@ -101,6 +104,7 @@ class TimeTransmitter {
   Duration sync_interval_;
   Port port_;
   PeerDelay peer_delay_;
+  AnswerLimit<kReceivers> answer_limit_;
   FreeRunningTime next_announce_{};
   FreeRunningTime next_sync_{};
   std::uint16_t next_announce_id_ = 0;

@@ -83,6 +83,27 @@ TEST_F(Transmitter, tells_of_another_that_announces_itself) {
   EXPECT_EQ(std::get<TransmitterSeen>(actions[0]).port, (PortIdentity{{{9}}, 1}));
 }
 
+TEST_F(Transmitter, a_flood_of_requests_is_answered_a_few_and_another_receiver_each_time) {
+  const PortIdentity other{ClockIdentity::from_mac({2, 0, 0, 0, 0, 2}), 1};
+  std::size_t answers_to_other = 0;
+  std::size_t answers_to_flood = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const Nanoseconds now = 1s + i * 100us;
+    const PortIdentity source = i % 1000 == 0 ? other : kReceiver;
+    const MessageBytes request = *encode(
+        Message{Header{.domain = 3, .source = source, .sequence_id = static_cast<std::uint16_t>(i)},
+                DelayReq{}});
+    const auto answers =
+        sent(transmitter_.on_event_message(request.view(), reference(now), raw(now)));
+    (source == other ? answers_to_other : answers_to_flood) += answers.size();
+  }
+  EXPECT_EQ(answers_to_other, 100U);
+  EXPECT_LE(answers_to_flood, 11U * 256U) << "ten seconds and a full bucket";
+  EXPECT_GT(answers_to_flood, 11U * 255U);
+  EXPECT_EQ(count(Counter::kAnswersRefused), 100'000U - answers_to_other - answers_to_flood);
+  EXPECT_EQ(count(Counter::kDelayReqReceived), count(Counter::kDelayRespSent));
+}
+
 TEST_F(Transmitter, becomes_the_transmitter_at_once) {
   TimeTransmitter transmitter(default_config());
   EXPECT_EQ(transmitter.state(), PortState::kInitializing);
