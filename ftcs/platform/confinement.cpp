@@ -119,7 +119,8 @@ constexpr Calls kRealTime = {
 constexpr Calls kThreads = {"set_robust_list", "set_tid_address", "membarrier"};
 constexpr Calls kServer = {"accept",    "accept4",    "epoll_create1",
                            "epoll_ctl", "epoll_wait", "epoll_pwait"};
-/// What the same calls are called where a word has 32 bits.
+/// What the same calls are called where a word has 32 bits. Not socketcall and ipc, which stand for
+/// many: libseccomp allows them with the arguments of those that are on the lists.
 constexpr Calls kOf32Bits = {
     "mmap2",
     "fstat64",
@@ -151,8 +152,6 @@ constexpr Calls kOf32Bits = {
     "timerfd_gettime64",
     "recvmmsg_time64",
     "utimensat_time64",
-    "socketcall",
-    "ipc",
 };
 constexpr Calls kSteeringOf32Bits = {"clock_adjtime64", "clock_settime64"};
 
