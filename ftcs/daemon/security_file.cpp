@@ -118,9 +118,11 @@ Result<KeyLine, std::string> parse_key(const Words& words) {
   if (needed != 0 && key->size() != needed) {
     return fmt::format("key {}: has {} octets, {} needs {}", *id, key->size(), words[1], needed);
   }
-  if (words.size() == 4 && whole(words[2], 1, std::numeric_limits<std::uint32_t>::max()) !=
-                               static_cast<std::uint32_t>(key->size())) {
-    return fmt::format("key {}: has {} octets, its length says {}", *id, key->size(), words[2]);
+  if (words.size() == 3) return KeyLine{*id, *kind, std::move(*key)};
+  const auto length = whole(words[2], 1, std::numeric_limits<std::uint32_t>::max());
+  if (!length) return fmt::format("key {}: its length: expected a number, at least 1", *id);
+  if (*length != key->size()) {
+    return fmt::format("key {}: has {} octets, its length says {}", *id, key->size(), *length);
   }
   return KeyLine{*id, *kind, std::move(*key)};
 }

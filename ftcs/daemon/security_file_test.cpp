@@ -89,7 +89,8 @@ TEST(SecurityFile, repeats_no_key_in_an_error) {
     EXPECT_EQ(wrong.find("5e"), std::string::npos) << wrong;
   }
   // In the place of something else.
-  for (const char* line : {"HEX:5e 1", "1 HEX:5e SHA256", "1 HEX:5e 1 SHA256", "HEX:5e SHA256 1"}) {
+  for (const char* line : {"HEX:5e 1", "1 HEX:5e SHA256", "1 HEX:5e 1 SHA256", "HEX:5e SHA256 1",
+                           "1 SHA256 HEX:5e abc"}) {
     const std::string wrong = wrong_with(std::string("spp 1\n") + line);
     EXPECT_NE(wrong, "");
     EXPECT_EQ(wrong.find("5e"), std::string::npos) << wrong;
