@@ -7,6 +7,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -303,25 +304,28 @@ TEST_F(AuthenticReceiver, is_not_kept_with_a_silent_transmitter_by_old_announces
 /// to the same receiver after its next start.
 TEST_F(AuthenticReceiver, started_again_it_takes_no_recorded_answer_for_its_own) {
   std::size_t answered[2] = {};
+  std::vector<std::uint16_t> recorded;
   for (const bool again : {false, true}) {
     TimeReceiverConfig config = with(&shared());
     config.first_request_id = again ? 40'000 : 7;
     receiver_ = TimeReceiver(config);
     static_cast<void>(receiver_.start(local(0s)));
     hear_a();
+    std::size_t asked = 0;
     for (std::uint16_t id = 0; id < 100; ++id) {
       const Nanoseconds at = 300ms + 125ms * id;
-      if (id % 4 == 0)
+      if (id % 4 == 0) {
         static_cast<void>(hear_announce(static_cast<std::uint16_t>(102 + id / 4), at));
-      EXPECT_EQ(hear_sync(id, at), 1U) << "it is authentic, and new to who has just begun";
-      for (const SendMessage& ask : of<SendMessage>(receiver_.on_timer(local(at + 50ms)))) {
-        static_cast<void>(
-            receiver_.on_transmit_timestamp(ask.id(), local(at + 50ms), local(at + 50ms)));
       }
-      // Ids of the first session.
-      const Message answer = message_from(kA, static_cast<std::uint16_t>(7 + id),
-                                          DelayResp{reference(at + 50ms + kDelay), kUs});
-      answered[again ? 1 : 0] += of<EmitPair>(hear(answer, at + 60ms)).size();
+      EXPECT_EQ(hear_sync(id, at), 1U) << "it is authentic, and new to who has just begun";
+      const Nanoseconds left = at + 50ms;
+      for (const SendMessage& ask : of<SendMessage>(receiver_.on_timer(local(left)))) {
+        static_cast<void>(receiver_.on_transmit_timestamp(ask.id(), local(left), local(left)));
+        if (!again) recorded.push_back(ask.sequence_id);
+        const Message answer =
+            message_from(kA, recorded.at(asked++), DelayResp{reference(left + kDelay), kUs});
+        answered[again ? 1 : 0] += of<EmitPair>(hear(answer, left + 2 * kDelay)).size();
+      }
     }
   }
   EXPECT_GT(answered[0], 5U);
