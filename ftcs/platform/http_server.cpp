@@ -5,7 +5,12 @@
 #include <charconv>
 #include <csignal>
 #include <cstring>
+#include <functional>
+#include <netinet/in.h>
+#include <semaphore>
+#include <sys/socket.h>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <httplib.h>
@@ -14,9 +19,50 @@ namespace ftcs::platform {
 namespace {
 
 constexpr std::size_t kWorkers = 8;
+constexpr int kMostWaiting =
+    8;  // connections that no worker has time for; further ones are the kernel's
 constexpr int kMostListeners = 4;  // of events: each keeps a worker
 constexpr time_t kPatience_s = 2;
 constexpr time_t kIdle_s = 1;  // a connection that is kept open keeps a worker
+
+/// The library's own pool takes whatever comes, a descriptor each.
+class Workers final : public httplib::TaskQueue {
+ public:
+  void enqueue(std::function<void()> work) override {
+    places_.acquire();
+    pool_.enqueue([this, work = std::move(work)] {
+      work();
+      places_.release();
+    });
+  }
+  void shutdown() override { pool_.shutdown(); }
+
+ private:
+  std::counting_semaphore<> places_{static_cast<std::ptrdiff_t>(kWorkers) + kMostWaiting};
+  httplib::ThreadPool pool_{kWorkers};
+};
+
+std::uint16_t port_of(const sockaddr_storage& address) {
+  sockaddr_in6 ipv6{};  // its port stands where that of IPv4 does
+  std::memcpy(&ipv6, &address, sizeof ipv6);
+  const bool internet = address.ss_family == AF_INET || address.ss_family == AF_INET6;
+  return internet ? ntohs(ipv6.sin6_port) : 0;
+}
+
+/// Ends the connections of this process that came in at `port`: the library waits for each client
+/// as long as an octet comes now and then.
+void hang_up(std::uint16_t port) {
+  constexpr int kMostDescriptors = 4096;
+  for (int fd = 0; fd < kMostDescriptors; ++fd) {
+    int kind = 0;
+    socklen_t size = sizeof kind;
+    if (getsockopt(fd, SOL_SOCKET, SO_TYPE, &kind, &size) != 0 || kind != SOCK_STREAM) continue;
+    sockaddr_storage address{};
+    size = sizeof address;
+    if (getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) continue;
+    if (port_of(address) == port) ::shutdown(fd, SHUT_RDWR);
+  }
+}
 
 HttpRequest request_of(const httplib::Request& request) {
   return {request.get_header_value("Accept"), request.get_header_value("Origin"),
@@ -70,7 +116,7 @@ struct HttpServer::Implementation {
 
 HttpServer::HttpServer() : implementation_(std::make_unique<Implementation>()) {
   httplib::Server& server = implementation_->server;
-  server.new_task_queue = [] { return new httplib::ThreadPool(kWorkers); };
+  server.new_task_queue = [] { return new Workers; };
   // The library's own choice would let a second program have the same port unnoticed.
   server.set_socket_options([](socket_t socket) {
     const int one = 1;
@@ -152,6 +198,7 @@ void HttpServer::close() {
   if (!implementation_->thread.joinable()) return;
   while (!implementation_->server.is_running()) std::this_thread::yield();
   implementation_->server.stop();
+  hang_up(address_.port);
   implementation_->thread.join();
 }
 

@@ -3,23 +3,39 @@
 #include "ftcs/platform/http_server.h"
 
 #include <arpa/inet.h>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+#include <iterator>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <thread>
 #include <unistd.h>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 namespace ftcs::platform {
 namespace {
 
-/// What comes back for these octets, up to `most` of them.
-std::string talk(std::uint16_t port, const std::string& said, std::size_t most = 100'000) {
-  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+/// A connection, or -1; with SOCK_NONBLOCK one that may be on its way.
+int connect_to(std::uint16_t port, int kind = 0) {
+  const int fd = socket(AF_INET, SOCK_STREAM | kind, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return {};
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  if (errno == EINPROGRESS) return fd;
+  close(fd);
+  return -1;
+}
+
+/// What comes back for these octets, up to `most` of them.
+std::string talk(std::uint16_t port, const std::string& said, std::size_t most = 100'000) {
+  const int fd = connect_to(port);
+  if (fd < 0) return {};
   (void)!write(fd, said.data(), said.size());
   std::string answer;
   char buffer[1000];
@@ -78,6 +94,45 @@ TEST(HttpServer, streams_events_until_there_are_no_more) {
   const std::string answer = talk(server.address().port, request("GET", "/events"));
   EXPECT_NE(answer.find("text/event-stream"), std::string::npos) << answer;
   EXPECT_NE(answer.find("data: 2"), std::string::npos) << answer;
+}
+
+/// Each connection is a descriptor of the process, which needs them for its sockets and files.
+TEST(HttpServer, a_flood_of_connections_takes_few_descriptors) {
+  HttpServer server;
+  ASSERT_FALSE(server.open({"127.0.0.1", 0}));
+  const auto open_descriptors = [] {
+    const std::filesystem::directory_iterator all("/proc/self/fd");
+    return std::distance(begin(all), end(all));
+  };
+  const auto before = open_descriptors();
+  constexpr int kFlood = 100;
+  std::vector<int> clients;
+  for (int i = 0; i < kFlood; ++i)
+    clients.push_back(connect_to(server.address().port, SOCK_NONBLOCK));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_LT(open_descriptors() - before, kFlood + 25);
+  for (const int fd : clients) close(fd);
+}
+
+TEST(HttpServer, a_client_that_never_ends_its_request_does_not_hold_up_the_end) {
+  using std::chrono::steady_clock;
+  HttpServer server;
+  ASSERT_FALSE(server.open({"127.0.0.1", 0}));
+  std::atomic<bool> over = false;
+  std::thread trickle([&over, port = server.address().port] {
+    const int fd = connect_to(port);
+    for (int i = 0; i < 40 && !over; ++i) {
+      (void)!send(fd, "G", 1, MSG_NOSIGNAL);
+      std::this_thread::sleep_for(std::chrono::milliseconds(250));
+    }
+    close(fd);
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  const auto begin = steady_clock::now();
+  server.close();
+  EXPECT_LT(steady_clock::now() - begin, std::chrono::seconds(4));
+  over = true;
+  trickle.join();
 }
 
 TEST(HttpServer, what_is_no_request_does_no_harm) {
