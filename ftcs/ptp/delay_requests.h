@@ -22,8 +22,8 @@ class DelayRequests {
   static constexpr std::int8_t kLongestDemandedLogInterval = 5;
 
   /// `log_interval`: logMinDelayReqInterval, log2 of seconds, -7 to 7; outside, one second. `seed`:
-  /// of the random intervals; two receivers with one seed ask at the same moments. `first_id`: of the first
-  /// request.
+  /// of the random intervals; two receivers with one seed ask at the same moments. `first_id`: of
+  /// the first request.
   DelayRequests(std::int8_t log_interval, std::uint64_t seed, std::uint16_t first_id) noexcept;
 
   /// The first request is due at once, unless one was for that reason within the last interval;
