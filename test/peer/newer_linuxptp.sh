@@ -4,15 +4,16 @@
 # no right is needed. $FTCS_NEWER_PTP4L, where it is set, is taken instead.
 #
 # What is downloaded (3 MB, once) is kept in $XDG_CACHE_HOME/ftcs/linuxptp or ~/.cache/ftcs/linuxptp;
-# $FTCS_DEBIAN_MIRROR is asked for it (http://deb.debian.org/debian), $FTCS_NEWER_SUITE (forky) is the suite. Exit code 77,
-# and the reason, where it cannot be had.
+# $FTCS_DEBIAN_MIRROR is asked for it, or else the mirror of the system's own apt; $FTCS_NEWER_SUITE (forky) is the suite.
+# Exit code 77, and the reason, where it cannot be had.
 set -euo pipefail
 
 if [ -n "${FTCS_NEWER_PTP4L:-}" ]; then
   realpath "$FTCS_NEWER_PTP4L"
   exit 0
 fi
-mirror=${FTCS_DEBIAN_MIRROR:-http://deb.debian.org/debian}
+# shellcheck source=test/debian_mirror.sh
+source "$(dirname "$(realpath "$0")")/../debian_mirror.sh"
 suite=${FTCS_NEWER_SUITE:-forky}
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/ftcs/linuxptp
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg
@@ -57,6 +58,8 @@ END
 }
 
 if [ ! -x ptp4l ]; then
+  mirror=$(debian_mirror)
+  [ -n "$mirror" ] || skip "$no_mirror"
   download
   rm -rf prefix
   for deb in debs/*.deb; do dpkg -x "$deb" prefix; done
