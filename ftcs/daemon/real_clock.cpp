@@ -25,7 +25,7 @@ std::string describe(const std::string& clock, ClockError error) {
     case ClockError::kNotPermitted:
       return clock + ": not permitted to steer it";
     case ClockError::kBusy:
-      return clock + ": busy, the kernel refuses to steer it now";
+      return clock + ": busy, its driver does not answer or refuses to steer it now";
     case ClockError::kGone:
       return clock + ": the device is gone";
     case ClockError::kRateOutOfLimits:

@@ -182,11 +182,14 @@ std::optional<ClockError> ClockDevice::failed(int result) noexcept {
 
 std::optional<std::int64_t> ClockDevice::read_clock() noexcept {
   const std::int64_t now = kernel_->clock_ns(id_);
-  if (now == 0) {
-    error_number_ = ENODEV;
-    return std::nullopt;
-  }
-  return now;
+  return now == 0 ? std::nullopt : std::optional(now);
+}
+
+// The kernel itself says which rate a clock has, as long as that is there; only a reading needs the
+// driver, which may be held up by something else.
+ClockError ClockDevice::why_unread() noexcept {
+  const auto answer = rate();
+  return answer ? ClockError::kBusy : answer.error();
 }
 
 std::optional<ClockDevice::Reading> ClockDevice::read_once() noexcept {
@@ -205,9 +208,9 @@ Result<ClockDevice::Reading, ClockError> ClockDevice::read() noexcept {
   Reading best{0, 0, std::numeric_limits<std::int64_t>::max()};
   for (int i = 0; i < kReadings && best.width_ns > enough; ++i) {
     const auto reading = read_once();
-    if (!reading) return ClockError::kGone;
-    if (reading->width_ns < best.width_ns) best = *reading;
+    if (reading && reading->width_ns < best.width_ns) best = *reading;
   }
+  if (best.width_ns == std::numeric_limits<std::int64_t>::max()) return why_unread();
   quickest_ns_ = enough == 0 ? best.width_ns : std::min(quickest_ns_, best.width_ns);
   return best;
 }

@@ -38,13 +38,14 @@ class ClockDevice {
     std::int64_t raw_ns = 0;
     std::int64_t width_ns = 0;  ///< the true raw time lies within ± width/2
   };
-  /// The quickest of several: whoever is preempted in the middle of one reads again.
+  /// The quickest of several: whoever is preempted in the middle of one reads again. kBusy: the
+  /// driver answers none of them, for now.
   [[nodiscard]] Result<Reading, ClockError> read() noexcept;
   /// The narrowest reading so far.
   [[nodiscard]] std::int64_t quickest_ns() const noexcept { return quickest_ns_; }
   /// CLOCK_MONOTONIC_RAW alone.
   [[nodiscard]] std::int64_t read_raw() noexcept { return kernel_->clock_ns(CLOCK_MONOTONIC_RAW); }
-  /// The clock alone; no value: the device is gone.
+  /// The clock alone; no value: the device is gone, or its driver busy.
   [[nodiscard]] std::optional<std::int64_t> read_clock() noexcept;
   /// The rate that the kernel holds, against its own oscillator.
   [[nodiscard]] Result<Rate, ClockError> rate() noexcept;
@@ -78,6 +79,7 @@ class ClockDevice {
   [[nodiscard]] std::optional<OsError> probe_rights();
   [[nodiscard]] std::optional<ClockError> failed(int result) noexcept;
   [[nodiscard]] std::optional<Reading> read_once() noexcept;
+  [[nodiscard]] ClockError why_unread() noexcept;
 
   Kernel* kernel_;
   std::string name_;

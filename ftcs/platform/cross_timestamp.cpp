@@ -16,6 +16,14 @@ std::int64_t nanoseconds(const ptp_clock_time& time) noexcept {
 // Fewer readings than were asked for, or readings that run backward, are no reading.
 constexpr int kShortRead = -EPROTO;
 
+// A driver may be held up by firmware or by another processor: asked again at once it mostly
+// answers.
+constexpr int kAttempts = 5;
+bool may_pass(int result) noexcept {
+  return result == -EBUSY || result == -EAGAIN || result == -EINTR || result == -EIO ||
+         result == -ETIMEDOUT;
+}
+
 class Quickest {
  public:
   void offer(std::int64_t before, std::int64_t phc, std::int64_t after) noexcept {
@@ -51,7 +59,7 @@ const char* name(CrossMethod method) noexcept {
 CrossTimestamper::CrossTimestamper(Kernel& kernel, const ClockDevice& device) noexcept
     : kernel_(kernel), descriptor_(device.descriptor()), name_(device.name()) {
   for (const auto method : {CrossMethod::kPrecise, CrossMethod::kExtended, CrossMethod::kBasic}) {
-    if (attempt(method, 1).result < 0) continue;
+    if (persistently(method, 1).result < 0) continue;
     method_ = method;
     return;
   }
@@ -72,9 +80,16 @@ CrossTimestamper::Attempt CrossTimestamper::attempt(CrossMethod method,
   return {-EOPNOTSUPP, {}};
 }
 
+CrossTimestamper::Attempt CrossTimestamper::persistently(CrossMethod method,
+                                                         unsigned readings) noexcept {
+  Attempt made = attempt(method, readings);
+  for (int i = 1; i < kAttempts && may_pass(made.result); ++i) made = attempt(method, readings);
+  return made;
+}
+
 Result<CrossReading, OsError> CrossTimestamper::read(int readings) {
   const auto count = static_cast<unsigned>(std::clamp(readings, 1, PTP_MAX_SAMPLES));
-  const Attempt made = attempt(method_, count);
+  const Attempt made = persistently(method_, count);
   if (made.result >= 0) return made.reading;
   OsError error = os_error(-made.result, name_ + ": reading against CLOCK_REALTIME");
   if (made.result == -ENODEV) error.kind = OsErrorKind::kNoSuchDevice;

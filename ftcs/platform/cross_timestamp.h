@@ -49,6 +49,7 @@ class CrossTimestamper {
   [[nodiscard]] Attempt extended(unsigned readings) noexcept;
   [[nodiscard]] Attempt basic(unsigned readings) noexcept;
   [[nodiscard]] Attempt attempt(CrossMethod method, unsigned readings) noexcept;
+  [[nodiscard]] Attempt persistently(CrossMethod method, unsigned readings) noexcept;
 
   Kernel& kernel_;
   int descriptor_;

@@ -23,6 +23,8 @@ constexpr std::int64_t kStepFloorPhcNs = 1'000'000;
 constexpr std::int64_t kReadingToleranceNs = 1'000;
 // A timer cannot be set more finely: a correction that has less than this to go ends now.
 constexpr Duration kTimerGrain = Nanoseconds{500};
+// A driver that is busy answers again some time, one that does not for so long never.
+constexpr std::int64_t kLongestUnreadNs = 10'000'000'000;
 // A kernel that refuses is not asked again at once.
 constexpr Duration kRetryInterval{Nanoseconds{10'000'000}};
 // The kernel keeps the frequency in its own units and may return one unit less.
@@ -67,14 +69,35 @@ KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_
   history_ = SteeringHistory{starting_at(free, local, held_rate_)};
   latest_ = {free, local};
   latest_raw_ns_ = reading->raw_ns;
-  latest_width_ns_ = reading->width_ns;
+  latest_width_ns_ = usual_width_ns_ = reading->width_ns;
   anchor_ = {free, reading->raw_ns, reading->width_ns};
 }
 
 Result<ClockDevice::Reading, ClockError> KernelClock::read_device() noexcept {
   auto reading = device_.read();
-  if (!reading) failure_ = reading.error();
+  if (reading) {
+    unread_since_ns_.reset();
+    learn_width(reading->width_ns);
+    return reading;
+  }
+  const std::int64_t now = device_.read_raw();
+  const std::int64_t since = unread_since_ns_.value_or(now);
+  unread_since_ns_ = since;
+  if (reading.error() != ClockError::kBusy || now - since > kLongestUnreadNs)
+    failure_ = reading.error();
   return reading;
+}
+
+// A driver that is busy for a moment is no reason to stop: until it answers again the clock shows
+// what its last good reading and the commands since then say.
+bool KernelClock::go_on_unread() noexcept {
+  if (failure_) return false;
+  const std::int64_t raw_ns = device_.read_raw();
+  const FreeRunningTime instant = free_at_raw(raw_ns);
+  latest_ = {instant, history_.local_at(instant)};
+  latest_raw_ns_ = raw_ns;
+  latest_width_ns_ = static_cast<std::int64_t>(anchor_doubt_ns(raw_ns));
+  return true;
 }
 
 FreeRunningTime KernelClock::free_at_raw(std::int64_t raw_ns) const noexcept {
@@ -112,12 +135,19 @@ std::optional<ClockError> KernelClock::confirm_step(ClockDevice::Reading& now) n
   return std::nullopt;
 }
 
-// A bracket that an interrupt has made wide says less: only what lies outside of it is believed.
+// What a bracket is wider by than usual lies on one side of the clock or on the other: only what
+// goes beyond that is believed. An interrupt makes it wide; a second that has just passed makes
+// each reading after it a little longer, and its middle wrong by the same each time.
 Duration KernelClock::beyond_bracket(Duration deviation,
                                      const ClockDevice::Reading& reading) const noexcept {
-  if (!is_wide(reading.width_ns)) return deviation;
-  const double half = static_cast<double>(reading.width_ns) / 2.0;
+  const auto surplus = static_cast<double>(reading.width_ns - usual_width_ns_);
+  const double half = std::max(surplus, 0.0) / 2.0;
   return deviation - Duration::from_ns(std::clamp(deviation.ns(), -half, half));
+}
+
+// The median of the last ones, in steps of a nanosecond.
+void KernelClock::learn_width(std::int64_t width_ns) noexcept {
+  usual_width_ns_ += width_ns > usual_width_ns_ ? 1 : width_ns < usual_width_ns_ ? -1 : 0;
 }
 
 // The part of a deviation of CLOCK_REALTIME that what was commanded has to follow. The rest is the
@@ -136,8 +166,8 @@ Duration KernelClock::not_made_good(Duration deviation,
 bool KernelClock::look() noexcept {
   if (failure_) return false;
   auto now = read_device();
-  if (!now) return false;
-  if (deviation_of(*now).is_step && confirm_step(*now)) return false;
+  if (!now) return go_on_unread();
+  if (deviation_of(*now).is_step && confirm_step(*now)) return go_on_unread();
   const Deviation deviation = deviation_of(*now);
   if (deviation.is_step) {
     note_leap_or_step(deviation, *now);
@@ -290,8 +320,11 @@ std::optional<ClockError> KernelClock::change_rate(Rate rate, Duration step) noe
   history_.steer(std::max(free_at_raw(before + half_ns), latest_.free_running), effective,
                  whole_step);
   const auto after = read_device();
-  if (!after) return after.error();
-  place_change(*after, doubt_ns);
+  if (after) {
+    place_change(*after, doubt_ns);
+  } else if (!go_on_unread()) {
+    return failure_;
+  }
   return std::nullopt;
 }
 
@@ -323,13 +356,15 @@ void KernelClock::end_correction() noexcept {
 }
 
 void KernelClock::settle() noexcept {
-  if (end_ && look()) end_correction();
+  constexpr int kAttempts = 5;
+  for (int i = 0; end_ && i < kAttempts && look(); ++i) end_correction();
 }
 
 void KernelClock::settle_at(Rate rate) noexcept {
   if (!has_steered_ || rate == tracking_rate_) return settle();
   tracking_rate_ = limits_.clamp(rate);
-  if (look()) end_correction();
+  end_ = latest_.free_running;
+  settle();
 }
 
 void KernelClock::set_timescale_offset(Duration ahead) noexcept {

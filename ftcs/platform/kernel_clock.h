@@ -85,7 +85,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] std::uint64_t foreign_steps() const noexcept { return foreign_steps_; }
   /// How often somebody else has changed its frequency; as far as was seen.
   [[nodiscard]] std::uint64_t foreign_rates() const noexcept { return foreign_rates_; }
-  /// Set for good once the device is gone.
+  /// Set for good once the device is gone, or cannot be read for ten seconds.
   [[nodiscard]] std::optional<ClockError> failure() const noexcept { return failure_; }
   [[nodiscard]] ClockDevice& device() noexcept { return device_; }
   [[nodiscard]] const ClockDevice& device() const noexcept { return device_; }
@@ -100,6 +100,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
 
   [[nodiscard]] Result<ClockDevice::Reading, ClockError> read_device() noexcept;
   [[nodiscard]] bool look() noexcept;
+  [[nodiscard]] bool go_on_unread() noexcept;
   [[nodiscard]] Deviation deviation_of(const ClockDevice::Reading& now) const noexcept;
   [[nodiscard]] std::optional<ClockError> confirm_step(ClockDevice::Reading& now) noexcept;
   void take(const ClockDevice::Reading& now, FreeRunningTime instant) noexcept;
@@ -114,6 +115,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
                                        std::int64_t elapsed_raw_ns) const noexcept;
   [[nodiscard]] Duration beyond_bracket(Duration deviation,
                                         const ClockDevice::Reading& reading) const noexcept;
+  void learn_width(std::int64_t width_ns) noexcept;
   void learn_gain(Duration deviation, const ClockDevice::Reading& now) noexcept;
   void forget_gain_interval() noexcept;
   void note_leap_or_step(const Deviation& deviation, const ClockDevice::Reading& now) noexcept;
@@ -133,6 +135,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   ClockReading latest_{};  // of the last look at the device
   std::int64_t latest_raw_ns_ = 0;
   std::int64_t latest_width_ns_ = 0;
+  std::int64_t usual_width_ns_ = 0;
   Duration wander_{};  // of CLOCK_REALTIME from what was commanded, at the last look
   // The reading that says best what the free-running face shows when CLOCK_MONOTONIC_RAW shows
   // something: not the last one, if that was wide.
@@ -154,6 +157,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   ForeignSteering foreign_{};
   std::uint64_t foreign_steps_ = 0;
   std::uint64_t foreign_rates_ = 0;
+  std::optional<std::int64_t> unread_since_ns_{};  // by CLOCK_MONOTONIC_RAW
   std::optional<ClockError> failure_{};
 };
 

@@ -80,6 +80,27 @@ INSTANTIATE_TEST_SUITE_P(Both, KernelClockPreemptionTest,
                            return kind.param == Kind::kSystem ? "system" : "phc";
                          });
 
+// One look in eight takes 40 ns longer, all on one side of the clock, as right after a second has
+// passed. What is commanded is anchored to the system clock by its readings: not by these.
+TEST_P(KernelClockPreemptionTest, what_makes_a_reading_a_little_longer_each_second_leaves_no_bias) {
+  if (GetParam() == Kind::kPhc) GTEST_SKIP() << "the anchor of a hardware clock is itself";
+  KernelClock clock = make();
+  ASSERT_TRUE(clock.apply(correct(0.0, 0.0, 20.0)).ok());
+  int look = 0;
+  kernel.on_clock_read = [&] {
+    if (look % 8 == 7 && kernel.last_read == CLOCK_REALTIME) kernel.run(40.0);
+  };
+  double sum = 0.0;
+  constexpr int kLooks = 800;
+  for (look = 0; look < kLooks; ++look) {
+    kernel.run(125 * kMillisecond);
+    (void)clock.read();
+    const auto raw = FreeRunningTime::from_ns(std::llround(kernel.raw));
+    sum += (clock.local_at(raw) - clock.local_of(stamp())).ns();
+  }
+  EXPECT_NEAR(sum / kLooks, 0.0, 0.7);
+}
+
 TEST_P(KernelClockPreemptionTest, the_first_reading_is_no_step_of_the_second) {
   for (const int times : {1, 5, 100}) {
     preempt_readings(times);

@@ -67,6 +67,7 @@ class FakeClocks : public FakeKernel {
   int extended_errno = 0;
   int basic_errno = 0;
   bool phc_gone = false;
+  std::function<bool()> driver_is_busy;  ///< EBUSY for readings and commands of hardware clocks
   bool short_cross_reads = false;
   bool run_folder_is_writable = true;
   bool device_numbers_known = true;
@@ -97,7 +98,7 @@ class FakeClocks : public FakeKernel {
     if (clock == CLOCK_REALTIME) return kEpoch + std::llround(system.time_ns);
     if (clock == CLOCK_MONOTONIC_RAW || clock == CLOCK_MONOTONIC) return std::llround(raw);
     if (clock == CLOCK_BOOTTIME) return std::llround(raw) + slept_ns;
-    if (phc_gone) return 0;
+    if (phc_gone || is_busy()) return 0;
     run(static_cast<double>(phc_reading_ns) / 2);
     const Clock& read = clock == clock_id_of(kOtherPhcDescriptor) ? other_phc : phc;
     const std::int64_t now = kEpoch + std::llround(read.time_ns);
@@ -156,6 +157,7 @@ class FakeClocks : public FakeKernel {
     if (&clock != &system && phc_gone) return -ENODEV;
     if (request.modes != 0) {
       if (adjust_errno != 0) return -adjust_errno;
+      if (&clock != &system && is_busy()) return -EBUSY;
       if (on_adjust) on_adjust();
       if (const int error = change(clock, request); error != 0) return -error;
       ++commands;
@@ -170,6 +172,7 @@ class FakeClocks : public FakeKernel {
   int control(int fd, unsigned long request, void* argument) noexcept override {
     if (!is_phc(fd)) return FakeKernel::control(fd, request, argument);
     if (phc_gone) return -ENODEV;
+    if (request != PTP_CLOCK_GETCAPS && is_busy()) return -EBUSY;
     const Clock& clock = fd == kOtherPhcDescriptor ? other_phc : phc;
     switch (request) {
       case PTP_CLOCK_GETCAPS:
@@ -199,6 +202,7 @@ class FakeClocks : public FakeKernel {
     time.nsec = static_cast<std::uint32_t>(now % 1'000'000'000);
     return time;
   }
+  [[nodiscard]] bool is_busy() const { return driver_is_busy && driver_is_busy(); }
   static bool is_phc(int fd) {
     return fd == kPhcDescriptor || fd == kOtherNodeDescriptor || fd == kOtherPhcDescriptor;
   }

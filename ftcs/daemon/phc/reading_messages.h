@@ -21,8 +21,10 @@ namespace ftcs::daemon {
 /// With w the width of the reading and w0 the usual one, the sink was read at source ± w/2:
 ///
 ///   w about w0:  one message, at the source's own time.
-///   w > w0:      two, later and earlier by (w - w0) / 2: which side of the reading was held up is
+///   w >> w0:     two, later and earlier by (w - w0) / 2: which side of the reading was held up is
 ///                not known, and the servo's gate for late messages finds out.
+///   in between:  none. Its middle is off by no more than what is taken for noise, and by the same
+///                each time if it comes of one cause, such as a second that has just passed.
 ///
 /// To tell of a usual reading twice would make noise that is in both, as that of the kernel's
 /// clock, which runs in multiples of 119 ppb, look like a clock that wanders between readings, and
@@ -35,30 +37,42 @@ class ReadingMessages {
     ReferenceTime source;
   };
 
-  /// `may_split` false: always one message. Valid until the next call.
+  /// `may_split` false: always one message, the middle. Valid until the next call.
   [[nodiscard]] std::span<const Message> of(const Comparison& comparison, bool may_split) noexcept {
     const auto source = ReferenceTime::from_ns(comparison.source_ns);
-    const std::int64_t surplus_ns = surplus(comparison.delay_ns);
+    const Surplus surplus = surplus_of(comparison.delay_ns);
     const bool is_young = std::exchange(told_, std::min(told_ + 1, kYoung)) < kYoung;
-    if (!may_split || (surplus_ns == 0 && !(is_young && comparison.delay_ns > 0))) {
+    const bool is_whole = surplus.kind != Kind::kLarge;
+    if (!may_split || (is_whole && !(is_young && comparison.delay_ns > 0))) {
       messages_ = {Message{Direction::kForward, source}};
-      return std::span(messages_).first(1);
+      return std::span(messages_).first(may_split && surplus.kind == Kind::kSmall ? 0 : 1);
     }
-    const Duration half = Duration::from_whole_ns(surplus_ns).half();
+    const Duration half = Duration::from_whole_ns(is_whole ? 0 : surplus.ns).half();
     messages_ = {Message{Direction::kBackward, source + half},
                  Message{Direction::kForward, source - half}};
     return messages_;
   }
 
  private:
-  /// What a reading is wider by than the median of the last ones. Nothing, if by a small part: that
-  /// takes some instructions, an interrupt or a bus that is busy takes more.
-  [[nodiscard]] std::int64_t surplus(std::int64_t width_ns) noexcept {
-    constexpr std::int64_t kSmallPart = 16;
+  enum class Kind : std::uint8_t { kNone, kSmall, kLarge };
+  struct Surplus {
+    std::int64_t ns = 0;
+    Kind kind = Kind::kNone;
+  };
+  /// What a reading is wider by than the median of the last ones. None, if by no more than those
+  /// differ from each other; large, if by more than some instructions take: an interrupt, or a bus
+  /// that is busy.
+  [[nodiscard]] Surplus surplus_of(std::int64_t width_ns) noexcept {
+    constexpr double kLeastPart = 1.0 / 64.0;
+    constexpr double kLargePart = 1.0 / 16.0;
+    constexpr double kSpreads = 3.0;
     widths_.push(static_cast<double>(width_ns));
-    const auto usual_ns = static_cast<std::int64_t>(widths_.median());
-    const std::int64_t surplus_ns = width_ns - usual_ns;
-    return surplus_ns * kSmallPart > usual_ns ? surplus_ns : 0;
+    const double usual = widths_.median();
+    const double ns = static_cast<double>(width_ns) - usual;
+    const auto whole_ns = static_cast<std::int64_t>(ns);
+    if (ns > kLargePart * usual) return {whole_ns, Kind::kLarge};
+    const double spread = std::max(kSpreads * widths_.median_deviation(), kLeastPart * usual);
+    return {whole_ns, ns > spread ? Kind::kSmall : Kind::kNone};
   }
 
   static constexpr std::size_t kRemembered = 15;

@@ -51,6 +51,21 @@ TEST_F(ReadingMessagesTest, a_reading_about_as_wide_as_usual_is_its_middle_once)
   for (int i = 0; i < 40; ++i) EXPECT_EQ(tell(1000 + i), once_);
 }
 
+// One in eight, as after the end of each second of a clock that is read eight times in it.
+TEST_F(ReadingMessagesTest, one_that_is_a_little_wider_than_the_others_are_is_not_told) {
+  grow_up();
+  for (int i = 0; i < 80; ++i) {
+    EXPECT_EQ(tell(i % 8 == 7 ? 1040 : 1000), i % 8 == 7 ? std::vector<Told>{} : once_) << i;
+  }
+  EXPECT_EQ(tell(1040, false), once_) << "to a servo that takes every middle it is";
+}
+
+TEST_F(ReadingMessagesTest, where_readings_differ_all_along_they_are_told) {
+  grow_up();
+  for (int i = 0; i < 40; ++i) tell(1000 + 13 * (i % 5));
+  EXPECT_EQ(tell(1052), once_);
+}
+
 TEST_F(ReadingMessagesTest, what_a_reading_took_longer_is_half_a_delay_in_either_direction) {
   grow_up();
   EXPECT_EQ(tell(3000), twice(2000));
