@@ -88,8 +88,8 @@ void enter_script(const std::string& path, ftcs_servo_functions& functions) {
   const std::string code = fmt::format(
       "import ctypes, os, runpy, sys, threading, traceback\n"
       "ftcs_first = threading.Lock()\n"
-      // Else Python drops what a callback raises, and the run would go on without a servo. Seeds run
-      // in threads of their own: the first one that fails speaks and ends all, the others wait.
+      // Else Python drops what a callback raises, and the run would go on without a servo. Seeds
+      // run in threads of their own: the first one that fails speaks and ends all, the others wait.
       "def ftcs_raised(what):\n"
       "    ftcs_first.acquire()\n"
       "    traceback.print_exception(what.exc_type, what.exc_value, what.exc_traceback)\n"
