@@ -14,31 +14,11 @@
 #include "ftcs/ptp/security_association.h"
 #include "ftcs/ptp/time_transmitter.h"
 #include "test/support/receiver_fixture.h"
+#include "test/support/sum_code.h"
 
 namespace ftcs::ptp {
 namespace {
 using namespace receiver_test;
-
-class SumCode final : public MessageAuthenticationCode {
- public:
-  explicit SumCode(std::uint8_t key) : key_(key) {}
-  bool compute(std::span<const std::span<const std::uint8_t>> parts,
-               std::span<std::uint8_t> code) noexcept override {
-    std::uint64_t sum = key_;
-    for (const auto part : parts) {
-      for (const std::uint8_t octet : part) sum = sum * 31 + octet;
-    }
-    for (std::uint8_t& octet : code) {
-      sum = sum * 31 + 7;
-      octet = static_cast<std::uint8_t>(sum >> 24U);
-    }
-    return works;
-  }
-  bool works = true;
-
- private:
-  std::uint8_t key_;
-};
 
 /// Association 1 with key 1, of 16 octets, and key 2, of 32.
 struct Keys {
@@ -330,6 +310,51 @@ TEST_F(AuthenticReceiver, started_again_it_takes_no_recorded_answer_for_its_own)
   }
   EXPECT_GT(answered[0], 5U);
   EXPECT_EQ(answered[1], 0U);
+}
+
+// Recorded before the transmitter was started again, or half a round of the numbers ago.
+TEST_F(AuthenticReceiver, does_not_lose_its_transmitter_to_one_old_announce) {
+  hear_a();
+  static_cast<void>(hear_announce(20'000, 300ms));
+  EXPECT_EQ(count(Counter::kReplayed), 1U);
+  for (std::uint16_t id = 102; id < 110; ++id) {
+    const Nanoseconds at = 1s * (id - 101);
+    static_cast<void>(hear_announce(id, at));
+    static_cast<void>(receiver_.on_timer(local(at)));
+    ASSERT_NE(receiver_.transmitter(), nullptr) << id;
+  }
+}
+
+TEST_F(AuthenticReceiver, selects_no_transmitter_by_copies_of_one_announce) {
+  hear_a();
+  Message better = announce_from(kB, 1);
+  better.header.sequence_id = 7;
+  for (int i = 0; i < 5; ++i) static_cast<void>(hear(better, 300ms + i * 100ms));
+  EXPECT_EQ(count(Counter::kReplayed), 4U);
+  EXPECT_EQ(receiver_.transmitter()->port, kA);
+  better.header.sequence_id = 8;
+  static_cast<void>(hear(better, 1s));
+  EXPECT_EQ(receiver_.transmitter()->port, kB);
+}
+
+TEST_F(AuthenticReceiver, hears_another_transmitter_that_was_started_again_after_its_timeout) {
+  hear_a();
+  Message other = announce_from(kB, 200);
+  other.header.sequence_id = 500;
+  static_cast<void>(hear(other, 300ms));
+  other.header.sequence_id = 0;
+  static_cast<void>(hear(other, 3200ms));
+  EXPECT_EQ(count(Counter::kReplayed), 1U);
+  static_cast<void>(hear(other, 3300ms));
+  EXPECT_EQ(count(Counter::kReplayed), 1U);
+}
+
+TEST_F(AuthenticReceiver, hears_an_announce_again_after_as_many_were_lost_as_may_be) {
+  hear_a();
+  static_cast<void>(hear_announce(104, 3s));
+  static_cast<void>(receiver_.on_timer(local(4s)));
+  EXPECT_EQ(count(Counter::kReplayed), 0U);
+  EXPECT_NE(receiver_.transmitter(), nullptr);
 }
 
 TEST_F(AuthenticReceiver, follows_a_transmitter_that_was_started_again) {

@@ -60,7 +60,8 @@ ForeignTransmitters::Record* ForeignTransmitters::place_for(const PortIdentity& 
 ForeignTransmitters::Heard ForeignTransmitters::hear(const TransmitterData& data,
                                                      Duration announce_interval,
                                                      FreeRunningTime now,
-                                                     const PortIdentity& selected) noexcept {
+                                                     const PortIdentity& selected,
+                                                     std::uint16_t sequence_id) noexcept {
   Record* const record = place_for(data.port, selected, now);
   if (record == nullptr) return Heard::kTableFull;
   const bool known = record->used;
@@ -70,6 +71,7 @@ ForeignTransmitters::Heard ForeignTransmitters::hear(const TransmitterData& data
                    .announce_interval = announce_interval,
                    .last = now,
                    .before_last = record->last,
+                   .sequence_id = sequence_id,
                    .doubted_until = record->doubted_until};
   return known ? Heard::kKnown : Heard::kNew;
 }
@@ -90,6 +92,13 @@ const TransmitterData* ForeignTransmitters::best(const PortIdentity& selected, F
     best_is_doubted = doubted;
   }
   return best;
+}
+
+std::optional<std::uint16_t> ForeignTransmitters::sequence_id(
+    const PortIdentity& port) const noexcept {
+  const Record* const record = find(port);
+  if (record == nullptr) return std::nullopt;
+  return record->sequence_id;
 }
 
 std::optional<FreeRunningTime> ForeignTransmitters::receipt_timeout(const PortIdentity& port,

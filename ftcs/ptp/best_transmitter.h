@@ -33,7 +33,7 @@ class ForeignTransmitters {
   /// An Announce arrived. A newcomer may take the place of a transmitter that has fallen silent,
   /// but not that of `selected`: when its silence ends it is for the receipt timeout to say.
   Heard hear(const TransmitterData& data, Duration announce_interval, FreeRunningTime now,
-             const PortIdentity& selected = {}) noexcept;
+             const PortIdentity& selected = {}, std::uint16_t sequence_id = 0) noexcept;
 
   /// The best of the qualified ones and of `selected`, which needs no further qualification while
   /// it is in the table; null if there is none. With `first_suffices` one Announce within the
@@ -45,6 +45,8 @@ class ForeignTransmitters {
   [[nodiscard]] std::optional<FreeRunningTime> receipt_timeout(const PortIdentity& port,
                                                                int intervals) const noexcept;
 
+  /// Of its last Announce. None: not in the table.
+  [[nodiscard]] std::optional<std::uint16_t> sequence_id(const PortIdentity& port) const noexcept;
   /// None: not in the table.
   [[nodiscard]] std::optional<FreeRunningTime> last_heard(const PortIdentity& port) const noexcept;
 
@@ -64,6 +66,7 @@ class ForeignTransmitters {
     Duration announce_interval{};
     FreeRunningTime last{};
     FreeRunningTime before_last{};
+    std::uint16_t sequence_id = 0;
     std::optional<FreeRunningTime> doubted_until{};
   };
   [[nodiscard]] static bool qualified(const Record& record, FreeRunningTime now,

@@ -292,7 +292,6 @@ void TimeReceiver::follow_jump(Duration jump, FreeRunningTime now, ActionList& a
 void TimeReceiver::forget_exchanges() noexcept {
   matcher_.reset();
   sequence_window_.reset();
-  last_announce_.reset();
   delay_requests_.stop(port_.counters());
   has_information_ = false;
   new_time_base_told_ = 0;

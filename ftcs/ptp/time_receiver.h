@@ -174,7 +174,7 @@ class TimeReceiver {
   void send_delay_req_if_due(FreeRunningTime now, ActionList& actions) noexcept;
   bool emit(std::optional<EventPair> pair, FreeRunningTime now, ActionList& actions) noexcept;
   [[nodiscard]] bool is_new(const Header& header, FreeRunningTime now) noexcept;
-  [[nodiscard]] bool is_new_announce(const Header& header) noexcept;
+  [[nodiscard]] bool is_new_announce(const Header& header, FreeRunningTime now) noexcept;
   [[nodiscard]] bool believes(const EventPair& pair, FreeRunningTime now,
                               ActionList& actions) noexcept;
   void follow_jump(Duration jump, FreeRunningTime now, ActionList& actions) noexcept;
@@ -194,7 +194,6 @@ class TimeReceiver {
   std::optional<Duration> sync_interval_;
   SyncMatcher matcher_;
   SequenceWindow sequence_window_;                ///< of Sync and Follow_Up
-  std::optional<std::uint16_t> last_announce_{};  ///< sequence id of transmitter_'s
   DelayRequests delay_requests_;
   ReferenceWatch reference_;
   std::optional<Duration> untold_jump_{};  ///< found while none was selected

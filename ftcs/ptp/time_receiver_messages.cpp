@@ -137,19 +137,24 @@ bool TimeReceiver::is_new(const Header& header, FreeRunningTime now) noexcept {
   return found;
 }
 
-/// Of an authentic Announce: old ones must not keep a transmitter alive that is silent. One that
-/// was started again is lost with its Announce receipt timeout, and heard anew.
-bool TimeReceiver::is_new_announce(const Header& header) noexcept {
+/// Of an authentic Announce: old ones must neither select a transmitter nor keep one alive that is
+/// silent, nor one with a number far ahead make the true ones old. From who misses more in a row
+/// than the receipt timeout counts, or has been started again, nothing is heard until that timeout;
+/// then every number is new.
+bool TimeReceiver::is_new_announce(const Header& header, FreeRunningTime now) noexcept {
   const SecurityAssociation* const security = port_.security();
-  const bool judged = security != nullptr && security->sequence_window > 0 && has_transmitter_ &&
-                      header.source == transmitter_.port;
-  if (!judged) return true;
-  if (last_announce_ && sequence_distance(header.sequence_id, *last_announce_) <= 0) {
-    port_.count(Counter::kReplayed);
-    return false;
-  }
-  last_announce_ = header.sequence_id;
-  return true;
+  if (security == nullptr || security->sequence_window == 0) return true;
+  const auto last = foreign_.sequence_id(header.source);
+  if (!last) return true;
+  // The selected one is lost by the timer alone.
+  const bool is_selected = has_transmitter_ && header.source == transmitter_.port;
+  const auto timeout = foreign_.receipt_timeout(header.source, config_.announce_receipt_timeout);
+  if (!is_selected && now >= *timeout) return true;
+  const int ahead = sequence_distance(header.sequence_id, *last);
+  const int width = std::max<int>(security->sequence_window, config_.announce_receipt_timeout);
+  if (ahead > 0 && ahead <= width) return true;
+  port_.count(Counter::kReplayed);
+  return false;
 }
 
 void TimeReceiver::on_announce(const Header& header, const Announce& announce, FreeRunningTime now,
@@ -160,13 +165,14 @@ void TimeReceiver::on_announce(const Header& header, const Announce& announce, F
     port_.count(Counter::kUnusableAnnounce);
     return;
   }
-  if (!is_new_announce(header)) return;
+  if (!is_new_announce(header, now)) return;
   port_.count(Counter::kAnnounceReceived);
   const Duration interval = believed_interval(header, now);
   TransmitterData data{header.source, announce, header.flags};
   data.announce.origin = {};  // differs in each message and says nothing about the transmitter
   const auto heard =
-      foreign_.hear(data, interval, now, has_transmitter_ ? transmitter_.port : PortIdentity{});
+      foreign_.hear(data, interval, now, has_transmitter_ ? transmitter_.port : PortIdentity{},
+                    header.sequence_id);
   if (heard == ForeignTransmitters::Heard::kTableFull) port_.count(Counter::kForeignTableFull);
   if (heard == ForeignTransmitters::Heard::kNew)
     port_.push(TransmitterSeen{header.source}, actions);

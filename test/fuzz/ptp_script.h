@@ -11,7 +11,7 @@
 #include "ftcs/ptp/wire/byte_order.h"
 #include "ftcs/ptp/wire/codec.h"
 #include "test/fuzz/require.h"
-#include "test/fuzz/sum_code.h"
+#include "test/support/sum_code.h"
 
 namespace ftcs::ptp {
 

@@ -9,9 +9,10 @@ namespace ftcs::ptp {
 /// does.
 class SumCode final : public MessageAuthenticationCode {
  public:
+  explicit SumCode(std::uint8_t key = 1) : key_(key) {}
   bool compute(std::span<const std::span<const std::uint8_t>> parts,
                std::span<std::uint8_t> code) noexcept override {
-    std::uint64_t sum = 1;
+    std::uint64_t sum = key_;
     for (const auto part : parts) {
       for (const std::uint8_t octet : part) sum = sum * 31 + octet;
     }
@@ -19,8 +20,12 @@ class SumCode final : public MessageAuthenticationCode {
       sum = sum * 31 + 7;
       octet = static_cast<std::uint8_t>(sum >> 24U);
     }
-    return true;
+    return works;
   }
+  bool works = true;
+
+ private:
+  std::uint8_t key_;
 };
 
 /// An association with a short and a long code.
