@@ -15,17 +15,20 @@ void BridgeClock::on_frame(LocalTime dc, std::int64_t offset_ns) noexcept {
   frames_[count_++ % kKept] = {dc, offset_ns};
 }
 
-/// What had been added when the reference showed `instant`: between two frames that are kept.
+/// What had been added when the reference showed `instant`: between two frames that are kept, or
+/// before them on the line through all.
 Duration BridgeClock::offset_at(LocalTime instant) const noexcept {
   std::size_t back = 0;
   const std::size_t oldest = std::min(count_, kKept) - 1;
   while (back < oldest && instant < frame(back + 1).dc) ++back;
-  const Frame& after = frame(back);
-  if (is_reference_ || back == oldest) return Duration::from_whole_ns(after.offset_ns);
-  const Frame& before = frame(back + 1);
+  const bool is_older = back == oldest;
+  if (oldest == 0 || (is_reference_ && !is_older)) {
+    return Duration::from_whole_ns(frame(back).offset_ns);
+  }
+  const Frame& after = frame(is_older ? 0 : back);
+  const Frame& before = frame(is_older ? oldest : back + 1);
   const double step_ns = static_cast<double>(after.offset_ns - before.offset_ns);
-  const double part =
-      std::clamp((instant - before.dc).ns() / (after.dc - before.dc).ns(), 0.0, 1.0);
+  const double part = std::min((instant - before.dc).ns() / (after.dc - before.dc).ns(), 1.0);
   return Duration::from_whole_ns(before.offset_ns) + Duration::from_ns(step_ns * part);
 }
 

@@ -58,6 +58,21 @@ TEST_P(BridgeClockTest, brings_a_pair_forward_to_the_frame_whatever_the_offset_d
   }
 }
 
+// Five milliseconds are twenty cycles of 250 us, more than are kept: it was wrong by what had been
+// added in the others.
+TEST_P(BridgeClockTest, brings_a_pair_forward_that_is_older_than_the_frames_it_remembers) {
+  for (std::int64_t n = 30; n < 70; ++n) {
+    frame(n, -19.5);
+    if (n < 40) continue;
+    const auto plant = clock_.plant(kTracking);
+    ASSERT_TRUE(plant);
+    EXPECT_NEAR(plant->since_epoch().ns() - 5e12,
+                plant_ns(static_cast<double>(n * kCycle_ns)) - 5e12,
+                is_reference() ? kStep_ns / 2 + 2.5 : 2.5)
+        << n;
+  }
+}
+
 TEST_P(BridgeClockTest, goes_on_along_the_crystal_for_a_second_without_new_stamps) {
   for (std::int64_t n = 1; n < 10; ++n) frame(n, 0.5);
   for (std::int64_t n = 10; n < 1000; ++n) {
