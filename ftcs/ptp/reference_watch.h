@@ -86,8 +86,10 @@ class ReferenceWatch {
   constexpr Finding go_on(const EventPair& pair) noexcept {
     if (last_) {
       const Duration gap = pair.free_running - last_->free_running;
-      usual_gap_ = last_gap_ > Duration{} ? std::min(gap, last_gap_) : gap;
-      last_gap_ = gap;
+      if (gap <= Duration{kLongestSpan}) {  // else it was a silence
+        usual_gap_ = last_gap_ > Duration{} ? std::min(gap, last_gap_) : gap;
+        last_gap_ = gap;
+      }
     }
     last_ = pair;
     candidate_.reset();

@@ -499,6 +499,21 @@ TEST_F(Receiver, syncs_that_contradict_each_other_too_do_not_wear_the_oscillator
   EXPECT_EQ(emitted, 9U);
 }
 
+// The silence was taken for the usual gap between two Syncs, and the true ones were doubted for as
+// long.
+TEST_F(Receiver, one_wrong_sync_after_a_silence_is_not_believed_longer_than_any_other) {
+  select_a();
+  std::uint16_t id = 0;
+  const auto emitted = [&](Nanoseconds at, Nanoseconds told) {
+    return of<EmitPair>(event(message_from(kA, id++, Sync{reference(told)}), at)).size();
+  };
+  EXPECT_EQ(emitted(1s, 1s), 1U);
+  EXPECT_EQ(emitted(61s, 62s), 1U);
+  EXPECT_EQ(emitted(62s, 62s), 0U);
+  EXPECT_EQ(emitted(63s, 63s), 0U);
+  EXPECT_EQ(emitted(64s, 64s), 1U);
+}
+
 // Syncs that tell the true time make the gap between two short; three an hour ahead within a few
 // milliseconds were then a jump.
 TEST_F(Receiver, a_burst_behind_forged_syncs_that_agree_is_no_jump_either) {
