@@ -57,6 +57,10 @@ struct PtpArguments {
 /// `arguments` must outlive `command`.
 void add_ptp_arguments(CLI::App& command, PtpArguments& arguments);
 
+/// Reads the keys that `spp` asks for, while every right to read them is still there. Options that
+/// come from a configuration file alone need it as well. Returns what is wrong, or nothing.
+[[nodiscard]] std::optional<std::string> open_keys(daemon::PtpOptions& options);
+
 /// The options that those arguments ask for. Returns what is wrong with them, or nothing.
 [[nodiscard]] std::optional<std::string> make_ptp_options(const PtpArguments& arguments,
                                                           daemon::PtpOptions& options);

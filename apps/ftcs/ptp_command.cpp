@@ -118,23 +118,6 @@ Wrong apply_peer(const PtpArguments& arguments, daemon::PtpOptions& options) {
   return fmt::format("--unicast: '{}' is not {} address", arguments.unicast, kind);
 }
 
-/// The keys are read here, while every right to read them is still there.
-Wrong apply_authentication(daemon::PtpOptions& options) {
-  const daemon::SecurityOptions& wanted = options.authentication;
-  if (!wanted.spp) {
-    if (wanted.active_key_id != 0) return "active_key_id needs spp";
-    return std::nullopt;  // as for ptp4l: a file that no port names
-  }
-  if (wanted.sa_file.empty()) return "spp needs sa_file";
-  if (wanted.active_key_id == 0) return "spp needs active_key_id, 1 or more";
-  if (options.minor_version == 0)
-    return "spp needs ptp_minor_version 1: IEEE 1588-2008 has no such TLV";
-  if (options.source == daemon::Source::kPtp4l)
-    return "spp: with --source ptp4l it is ptp4l that authenticates";
-  options.security = std::make_shared<daemon::Security>(wanted);
-  return options.security->load();
-}
-
 Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
   // Who only receives time by multicast is asked nothing: messages to its own address come from
   // whoever can route a packet here.
@@ -150,7 +133,7 @@ Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
     if (!options.acceptable.add(*identity)) return "--acceptable-transmitter: more than 16 clocks";
   }
   if (arguments.no_fast_start) options.fast_start = false;
-  return apply_authentication(options);
+  return open_keys(options);
 }
 
 Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) {
@@ -229,6 +212,22 @@ Wrong apply_role(const PtpArguments& arguments, daemon::PtpOptions& options) {
 }
 
 }  // namespace
+
+std::optional<std::string> open_keys(daemon::PtpOptions& options) {
+  const daemon::SecurityOptions& wanted = options.authentication;
+  if (!wanted.spp) {
+    if (wanted.active_key_id != 0) return "active_key_id needs spp";
+    return std::nullopt;  // as for ptp4l: a file that no port names
+  }
+  if (wanted.sa_file.empty()) return "spp needs sa_file";
+  if (wanted.active_key_id == 0) return "spp needs active_key_id, 1 or more";
+  if (options.minor_version == 0)
+    return "spp needs ptp_minor_version 1: IEEE 1588-2008 has no such TLV";
+  if (options.source == daemon::Source::kPtp4l)
+    return "spp: with --source ptp4l it is ptp4l that authenticates";
+  options.security = std::make_shared<daemon::Security>(wanted);
+  return options.security->load();
+}
 
 std::optional<std::string> make_ptp_options(const PtpArguments& arguments,
                                             daemon::PtpOptions& options) {

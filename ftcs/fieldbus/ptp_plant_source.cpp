@@ -28,6 +28,8 @@ PtpOptions plant_options(PtpOptions options) {
   options.output = Output::kText;
   options.duration.reset();
   options.socket.interface = options.interface;
+  options.socket.unicast_messages =
+      options.hybrid ? platform::UnicastMessages::kDelayAnswers : platform::UnicastMessages::kNone;
   return options;
 }
 

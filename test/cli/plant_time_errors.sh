@@ -46,6 +46,9 @@ python3 -c 'import time, sys; sys.exit(time.clock_gettime_ns(11) - time.time_ns(
   refused 1 "CLOCK_TAI is not set" --plant-time tai
 [ -e /sys/kernel/time/aux_clocks ] || refused 1 "CLOCK_AUX 0 cannot be read" --plant-time aux0
 
+printf '%s\n' "[global]" "sa_file $folder/no-keys" "spp 1" "active_key_id 1" > "$folder/keys.conf"
+refused 2 "sa_file $folder/no-keys: No such file" --plant-time ptp:lo --ptp-config "$folder/keys.conf"
+
 segment --drives 2 --clock-bits 0
 refused 1 "there is nothing to put on plant time" --plant-time realtime --bus-mode external --await-lock 3
 segment --drives 2 --clock-bits 32
@@ -64,6 +67,19 @@ if [ "$(id -u)" -eq 0 ] && command -v ip > /dev/null && ip netns add "ftcs-pe$$"
   ip -n "$space" link set pt up
   ip -n "$space" link set gm up
   refused 3 "ptp:pt: not known after 4 s: " --plant-time ptp:pt --bus-mode external --await-lock 4
+  printf '%s\n' "[security_association]" "spp 1" "1 SHA256 secret" > "$folder/keys"
+  printf '%s\n' "[global]" "sa_file $folder/keys" "spp 1" "active_key_id 1" > "$folder/keys.conf"
+  "${inside[@]}" "$here/../doctor/transmitter.py" gm > "$folder/stranger.log" 2>&1 &
+  stranger=$!
+  pids+=("$stranger")
+  refused 3 "not authentic" --plant-time ptp:pt --ptp-config "$folder/keys.conf" --bus-mode external --await-lock 8
+  kill "$stranger"
+  "${inside[@]}" "$here/../doctor/transmitter.py" gm unicast_ip=10.77.0.1 \
+    unicast="$(ip -n "$space" -br link show pt | grep -oE '([0-9a-f]{2}:){5}[0-9a-f]{2}')" > "$folder/unicast.log" 2>&1 &
+  stranger=$!
+  pids+=("$stranger")
+  refused 3 "not locked" --plant-time ptp:pt --bus-mode external --await-lock 6
+  kill "$stranger"
   "${inside[@]}" "$here/../doctor/transmitter.py" gm flags=0 ahead=-1700000000 > "$folder/transmitter.log" 2>&1 &
   pids+=($!)
   refused 3 "an arbitrary epoch is no plant time" --plant-time ptp:pt --bus-mode external --await-lock 12

@@ -11,6 +11,7 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
 #include "apps/ftcs/output.h"
+#include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
 #include "apps/ftcs/watch_arguments.h"
@@ -183,6 +184,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
     return "--bus-mode: lead and external need --plant-time, the clock that is to be followed";
   }
   if (auto wrong = read_bridge(options)) return wrong;
+  if (auto wrong = open_keys(options.ptp)) return "--ptp-config: " + *wrong;
   if (auto wrong = check_drive_sync(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
