@@ -213,6 +213,11 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
   if (path.dry > kTooDry) search_.alarm(kLooksDry);
 }
 
+bool FloorEstimator::in_doubt() const noexcept {
+  const bool proven = std::min(paths_.forward.members, paths_.backward.members) > kShareFrom;
+  return !proven || paths_.forward.dry + paths_.backward.dry > kTooDry;
+}
+
 void FloorEstimator::choose() noexcept {
   const double product = paths_.forward.variance * paths_.backward.variance;
   scale_ = std::max(least_noise_, std::sqrt(std::sqrt(product)));

@@ -67,6 +67,9 @@ class FloorEstimator {
   /// Messages wait, as others see it.
   void wake() noexcept { search_.wake(); }
 
+  /// Messages at this floor have been few, or none has come for so long that it is no chance.
+  [[nodiscard]] bool in_doubt() const noexcept;
+
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }

@@ -87,7 +87,8 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   } else if (own > 0.5 && explained_alone_ > 0 && !contradicts) {
     --explained_alone_;
   }
-  if (explained_alone_ >= kExplainedAlone) floor_.unlock();
+  if (explained_alone_ >= kExplainedAlone && (plain_.settled() || floor_.in_doubt())) floor_.unlock();
+  explained_alone_ = std::min(explained_alone_, kExplainedAlone);
 }
 
 /// On a path that was settled: a second message of the last few that is late by
