@@ -41,6 +41,8 @@ constexpr int kEarlyMemory = 8;
 constexpr double kUnlikely = 0.1;
 /// Nats: none at the floor for so long is no chance (1e-6).
 constexpr double kTooDry = 14.0;
+/// Messages at a floor that was found, those of the fit (at most ten) included.
+constexpr double kProven = 12.0;
 /// Looks for another floor after an early message, after a dry run, after a
 /// jump.
 constexpr int kLooksEarly = 2;
@@ -172,7 +174,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const auto jump = jumps_.judge(detector_.lead(best_));
   // Late messages that agree by chance or by the length of a frame are no jump:
   // it brings an early one, or none is at the floor any more.
-  const bool shows = early_ > 0 || paths_.forward.dry + paths_.backward.dry > kTooDry;
+  const bool shows = early_ > 0 || dry();
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (jump == JumpWatch::Verdict::kJumped && shows) {
     bank_.start(jumps_.estimate());
@@ -213,9 +215,13 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
   if (path.dry > kTooDry) search_.alarm(kLooksDry);
 }
 
-bool FloorEstimator::in_doubt() const noexcept {
-  const bool proven = std::min(paths_.forward.members, paths_.backward.members) > kShareFrom;
-  return !proven || paths_.forward.dry + paths_.backward.dry > kTooDry;
+bool FloorEstimator::proven() const noexcept {
+  const double members = std::min(paths_.forward.members, paths_.backward.members);
+  return certainty_ > 0.0 && members > kProven;
+}
+
+bool FloorEstimator::dry() const noexcept {
+  return paths_.forward.dry + paths_.backward.dry > kTooDry;
 }
 
 void FloorEstimator::choose() noexcept {

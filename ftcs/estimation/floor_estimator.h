@@ -67,8 +67,10 @@ class FloorEstimator {
   /// Messages wait, as others see it.
   void wake() noexcept { search_.wake(); }
 
-  /// Messages at this floor have been few, or none has come for so long that it is no chance.
-  [[nodiscard]] bool in_doubt() const noexcept;
+  /// Messages of both directions have been seen there since.
+  [[nodiscard]] bool proven() const noexcept;
+  /// None has been for so long that it is no chance.
+  [[nodiscard]] bool dry() const noexcept;
 
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }

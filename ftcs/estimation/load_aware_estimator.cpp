@@ -87,8 +87,13 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   } else if (own > 0.5 && explained_alone_ > 0 && !contradicts) {
     --explained_alone_;
   }
-  if (explained_alone_ >= kExplainedAlone && (plain_.settled() || floor_.in_doubt())) floor_.unlock();
   explained_alone_ = std::min(explained_alone_, kExplainedAlone);
+  // What the first picture explains alone and is late for the floor may have waited, for a whole frame, or fragment, at
+  // a time: no end of a floor that is seen as often as before. An early one did not wait. A floor that is not believed
+  // yet does no harm.
+  const bool early = own < 0.5 && !floor_.testimony().late;
+  const bool disproven = early || floor_.dry() || (believed_ && !floor_.proven());
+  if (explained_alone_ == kExplainedAlone && disproven) floor_.unlock();
 }
 
 /// On a path that was settled: a second message of the last few that is late by
