@@ -60,6 +60,32 @@ TEST(RealLog, ptp4l_from_its_start_over_the_step) {
   expect_followed(log, 1000.0);
 }
 
+// ptp4l with summary_interval: 18 summaries while it listens (frequency 0), one with the step in it,
+// then of a clock that is steered. Its frequency is the oscillator's but for what the servo does.
+TEST(RealLog, ptp4l_summaries_begin_where_the_clock_is_steered) {
+  const RecordedLog log = read("ptp4l-summaries.log");
+  EXPECT_EQ(log.format, "ptp4l");
+  EXPECT_TRUE(log.steered);
+  ASSERT_EQ(log.pairs.size(), 25U);
+  ASSERT_EQ(log.summaries.size(), 25U);
+  EXPECT_EQ(log.summaries.front().rms_ns, 310.0);
+  EXPECT_EQ(log.summaries.back().max_ns, 217.0);
+  EXPECT_LT(largest_residual_ns(log, 0), 1500.0) << "as far as its servo went to remove 0.9 us";
+  ASSERT_GE(log.notes.size(), 1U);
+  EXPECT_NE(log.notes.at(0).find("19 summaries of the time before"), std::string::npos);
+  expect_followed(log, 1000.0);
+}
+
+// ptp4l over veth with free_running: 5 ppm slower than its transmitter, and nobody steers.
+TEST(RealLog, ptp4l_summaries_of_a_clock_that_ran_freely) {
+  const RecordedLog log = read("ptp4l-summaries-free.log");
+  EXPECT_FALSE(log.steered);
+  ASSERT_EQ(log.pairs.size(), 18U);
+  const double seconds = 17.0 * 4.0;
+  EXPECT_NEAR(x_ns(log, 17), -5000.0 * seconds, 50.0 * seconds);
+  EXPECT_NE(log.replay_notes.at(1).find("nobody steered the clock"), std::string::npos);
+}
+
 TEST(RealLog, phc2sys_from_its_start_over_the_step) {
   const RecordedLog log = read("phc2sys-startup.log");
   EXPECT_EQ(log.format, "phc2sys");

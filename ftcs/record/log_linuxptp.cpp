@@ -39,7 +39,7 @@ class LinuxptpLog final : public LogFormat {
                                       log_.describe_sources(), chosen_));
     }
     if (picked->lines.size() < picked->summaries.size()) {
-      rebuild(ascending(picked->summaries, log), log);
+      rebuild(steered(ascending(picked->summaries, log), log), log);
       log.unusable += picked->lines.size();
       return "";
     }
@@ -101,19 +101,53 @@ class LinuxptpLog final : public LogFormat {
     }
   }
 
-  /// Of summaries: the oscillator is the sum of the rates that were applied; how far off the clock
-  /// was is known in magnitude alone.
+  /// Without the summaries of the time before the program steered, whose frequency of zero says
+  /// nothing of the oscillator, and without the one in which it began.
+  static std::vector<SummaryLogLine> steered(std::vector<SummaryLogLine> lines, RecordedLog& log) {
+    auto first = std::find_if(lines.begin(), lines.end(), [](const SummaryLogLine& line) {
+      return line.frequency_ppb != 0.0 || line.frequency_spread_ppb != 0.0;
+    });
+    constexpr std::ptrdiff_t kFewest = 3;
+    if (first == lines.begin() || lines.end() - first <= kFewest) return lines;
+    ++first;
+    const auto dropped = static_cast<std::size_t>(first - lines.begin());
+    log.used -= dropped;
+    log.unusable += dropped;
+    log.notes.push_back(
+        fmt::format("{} summaries of the time before the clock was steered are left out", dropped));
+    lines.erase(lines.begin(), first);
+    return lines;
+  }
+
+  /// Whether the magnitude of the offset goes where the frequency, then a measurement, says: who
+  /// steers removes the offset and does not let it grow.
+  static bool ran_freely(const std::vector<SummaryLogLine>& lines,
+                         const std::vector<double>& steps_s) {
+    constexpr double kShare = 0.25;
+    for (std::size_t i = 1; i < lines.size(); ++i) {
+      const double grown_ns = std::abs(lines[i].rms_ns - lines[i - 1].rms_ns);
+      const double said_ns = std::abs(lines[i].frequency_ppb * steps_s[i - 1]);
+      if (said_ns == 0.0 || std::abs(grown_ns - said_ns) > kShare * said_ns) return false;
+    }
+    return lines.size() > 2;
+  }
+
+  /// Of summaries: the oscillator is the sum of the rates that were applied, or measured; how far
+  /// off the clock was is known in magnitude alone.
   void rebuild(const std::vector<SummaryLogLine>& summaries, RecordedLog& log) {
-    log.steered = true;
-    log.replay_notes.emplace_back(
-        "summaries (rms, max) hold no single offsets: the free-running clock is rebuilt from the "
-        "applied frequency alone");
-    log.replay_notes.emplace_back(
-        "so each servo meets the wander of the oscillator without the noise of the messages: its "
-        "figures are lower limits, and only the row \"as recorded\" is what the log says");
     std::vector<std::optional<double>> times;
     for (const SummaryLogLine& line : summaries) times.push_back(line.time_s);
     const std::vector<double> steps_s = intervals(times, log);
+    log.steered = !ran_freely(summaries, steps_s);
+    log.replay_notes.emplace_back(fmt::format(
+        "summaries (rms, max) hold no single offsets: the free-running clock is rebuilt from the "
+        "{} frequency alone",
+        log.steered ? "applied" : "measured"));
+    log.replay_notes.emplace_back(fmt::format(
+        "so each servo meets the wander of the oscillator without the noise of the messages: its "
+        "figures are lower limits{}",
+        log.steered ? ", and only the row \"as recorded\" is what the log says"
+                    : "; the offset grows as the frequency says: nobody steered the clock"));
     Duration reference{};
     double x_ns = 0.0;
     for (std::size_t i = 0; i < summaries.size(); ++i) {

@@ -38,6 +38,7 @@ struct SummaryLogLine {
   double rms_ns = 0.0;           ///< of the offsets
   double max_ns = 0.0;           ///< the largest |offset|
   double frequency_ppb = 0.0;    ///< mean of the applied ones
+  std::optional<double> frequency_spread_ppb{};  ///< their standard deviation
 };
 
 /// Nothing if the line is no summary.

@@ -36,6 +36,13 @@ start_node 2 ptp4l -f receiver.conf -S -i eth0 -m -q
 simulate 100 2
 mv log.2 ptp4l-startup.log
 
+printf '[global]\nfree_running 1\nlogSyncInterval -3\n' > transmitter.conf
+printf '[global]\nslaveOnly 1\nlogSyncInterval -3\nsummary_interval 1\n' > receiver.conf
+start_node 1 ptp4l -f transmitter.conf -i eth0 -m -q
+start_node 2 ptp4l -f receiver.conf -S -i eth0 -m -q
+simulate 100 2
+mv log.2 ptp4l-summaries.log
+
 # Slew at 10 ppm at most: a minute in which most of the offset is still to be removed. Addresses of clknetsim.
 printf 'pidfile 1.pid\nlocal stratum 1\nallow\ncmdport 0\nbindcmdaddress /\n' > server.conf
 printf '%s\n' "pidfile 2.pid" "server 192.168.123.1 minpoll 2 maxpoll 2 xleave iburst" "maxslewrate 10" \
@@ -51,7 +58,7 @@ start_node 1 phc2sys -s /dev/ptp0 -c CLOCK_REALTIME -O 0 -m -q
 simulate 60 1
 mv log.1 phc2sys-startup.log
 
-for log in ptp4l-startup phc2sys-startup chrony-tracking chrony-measurements; do
+for log in ptp4l-startup ptp4l-summaries phc2sys-startup chrony-tracking chrony-measurements; do
   "$ftcs" compare --log $log.log > out || { cat $log.log; echo "FAILED: ftcs compare --log $log.log"; exit 1; }
   grep -q "^adaptive" out || { cat out; echo "FAILED: no row for adaptive"; exit 1; }
   head -2 out
