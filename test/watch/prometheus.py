@@ -14,12 +14,22 @@ import urllib.request
 
 TOP = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 MONITORING = os.path.join(TOP, "packaging", "monitoring")
-PORT = 20000 + (os.getpid() % 2000) * 8
+PORT = 20000 + (os.getpid() % 1500) * 8  # below those that the kernel gives to whoever connects
 processes = []
 
 
-def start(*command):
-    processes.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+def start(folder, name, *command):
+    with open(os.path.join(folder, name + ".log"), "w") as log:
+        processes.append((name, subprocess.Popen(command, stdout=log, stderr=log)))
+
+
+def ended(folder):
+    """Whoever should still run and does not, and its last words."""
+    gone = [(name, process.returncode) for name, process in processes if process.poll() is not None]
+    for name, code in gone:
+        with open(os.path.join(folder, name + ".log")) as log:
+            print(f"{name} ended with {code}:\n" + "".join(log.readlines()[-12:]), flush=True)
+    return [name for name, _ in gone]
 
 
 def get(url):
@@ -30,11 +40,11 @@ def get(url):
 def start_daemons(ftcs, folder):
     base = [ftcs, "ptp", "-i", "lo", "--event-port", str(PORT), "--general-port", str(PORT + 1), "--uds_address", "none",
             "--logAnnounceInterval", "-2"]
-    start(*base, "--role", "time-transmitter", "--logSyncInterval", "-4", "--logMinDelayReqInterval", "-4")
-    start(*base, "--offset", "1us", "--skew", "50ppm", "--metrics", str(PORT + 2), "--metrics-file", os.path.join(folder, "ftcs.prom"))
-    start(ftcs, "ethercat-segment", "--udp", str(PORT + 3), "--drives", "4", "--priority", "0")
+    start(folder, "transmitter", *base, "--role", "time-transmitter", "--logSyncInterval", "-4", "--logMinDelayReqInterval", "-4")
+    start(folder, "receiver", *base, "--offset", "1us", "--skew", "50ppm", "--metrics", str(PORT + 2), "--metrics-file", os.path.join(folder, "ftcs.prom"))
+    start(folder, "segment", ftcs, "ethercat-segment", "--udp", str(PORT + 3), "--drives", "4", "--priority", "0")
     time.sleep(0.5)
-    start(ftcs, "ethercat", "run", "--udp", f"127.0.0.1:{PORT + 3}", "--cycle", "4ms", "--sync-interval", "200ms", "--gate", "2ms",
+    start(folder, "main-device", ftcs, "ethercat", "run", "--udp", f"127.0.0.1:{PORT + 3}", "--cycle", "4ms", "--sync-interval", "200ms", "--gate", "2ms",
           "--duration", "0", "--drift-pulses", "500", "--priority", "0", "--lost-frame-limit", "1000", "--unlocked-limit", "1000", "-q",
           "--metrics", str(PORT + 4))
 
@@ -48,7 +58,7 @@ scrape_configs:
   - job_name: ftcs
     static_configs: [{{targets: ["127.0.0.1:{PORT + 2}", "127.0.0.1:{PORT + 4}"]}}]
 """)
-    start("prometheus", f"--config.file={config}", f"--storage.tsdb.path={folder}/data", f"--web.listen-address=127.0.0.1:{PORT + 5}")
+    start(folder, "prometheus", "prometheus", f"--config.file={config}", f"--storage.tsdb.path={folder}/data", f"--web.listen-address=127.0.0.1:{PORT + 5}")
 
 
 def promtool(*arguments, text=None):
@@ -99,10 +109,13 @@ def main():
     try:
         start_daemons(os.path.realpath(sys.argv[1]), folder)
         start_prometheus(folder)
-        time.sleep(float(sys.argv[2]))
-        failures = judge(folder)
+        end = time.monotonic() + float(sys.argv[2])
+        while time.monotonic() < end and not ended(folder):
+            time.sleep(1)
+        gone = ended(folder)
+        failures = [f"{name} ended early" for name in gone] or judge(folder)
     finally:
-        for process in processes:
+        for _, process in processes:
             process.terminate()
             process.wait()
         shutil.rmtree(folder, ignore_errors=True)
