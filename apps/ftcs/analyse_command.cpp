@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "ftcs/record/series_reader.h"
 #include "ftcs/report/record_report.h"
@@ -124,13 +125,13 @@ void add_analyse_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("--nominal", options->series.nominal_hz,
                    "frequency in Hz that a record in Hz should have: 10e6")
-      ->check(CLI::PositiveNumber);
+      ->check(number_from(1e-12, 1e18));
   command->add_option("--source", options->series.source,
                       "of a log of several programs or clocks: which, as in 'phc2sys eth1'");
   command
       ->add_option("--interval", options->interval_s,
                    "seconds between values (default: from the times, else 1)")
-      ->check(CLI::PositiveNumber);
+      ->check(number_from(1e-12, 1e18));
   command->add_option(
       "--taus", options->taus,
       "octave (1, 2, 4, ... intervals), decade (1, 2, 4, 10, ...), all, or seconds: 1,10,100");

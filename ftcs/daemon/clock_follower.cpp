@@ -40,7 +40,7 @@ std::optional<std::string> ClockFollower::take(FreeRunningTime now,
     if (failure) continue;
     if (const auto* note = std::get_if<node::Note>(&*event)) failure = record_.add(*note);
     if (const auto* steered = std::get_if<node::Steered>(&*event)) {
-      failure = record_.add(*steered, now, sync_interval);
+      record_.add(*steered, now, sync_interval);
     }
   }
   return failure;

@@ -32,6 +32,8 @@ class ClockFollower {
 
   [[nodiscard]] bool locked() const { return node_.locked(); }
   [[nodiscard]] const ClockDiscipline& discipline() const { return node_.discipline(); }
+  /// Before the first pair.
+  void begin() { record_.begin(); }
   void set_watch(WatchFeed* feed) { record_.set_watch(feed); }
   [[nodiscard]] const FollowerRecord& record() const { return record_; }
   [[nodiscard]] FollowerRecord::Status status(FreeRunningTime now) const {

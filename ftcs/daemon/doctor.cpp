@@ -58,9 +58,11 @@ class WireWatch {
 PtpOptions quiet(PtpOptions options) {
   options.role = Role::kTimeReceiver;
   options.source = Source::kNetwork;
-  options.clock = ClockKind::kVirtual;
   options.clock_device.clear();
-  options.first_step = true;  // of the virtual clock: whatever the reference shows is followed
+  // In the place of a real clock: whatever the reference shows is followed, and compared with that
+  // clock afterwards. A virtual one does what it would do.
+  if (options.clock != ClockKind::kVirtual) options.first_step = true;
+  options.clock = ClockKind::kVirtual;
   options.driftfile.clear();
   options.chrony_socket.clear();
   options.ntp_shm_unit.reset();
@@ -182,6 +184,7 @@ std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
   of_other.domain = other->domain;
   of_other.acceptable = {};
   (void)of_other.acceptable.add(other->port.clock);
+  of_other.first_step = true;
   auto clocks = open_ptp_clocks(kernel, of_other, log);
   if (!clocks) return std::nullopt;
   PortFacts facts{{own, kPortOfItsOwn - 1}};
@@ -189,6 +192,28 @@ std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
   PtpReceiver second(kernel, of_other, log, std::move(clocks->timestamps), facts, nullptr);
   (void)second.run();
   return disagreement(*followed, first.time(), *other, second.time());
+}
+
+/// How far the real clock that would be steered is from the reference, if that is farther than is
+/// slewed and no step is allowed.
+std::optional<Duration> first_offset(platform::Kernel& kernel, const PtpOptions& given,
+                                     bool hardware, PtpReceiver& port) {
+  const TimeBound reference = port.time();
+  const DisciplineConfig config = follower_config(given, hardware, std::nullopt).discipline;
+  if (config.step.permits(true) || reference.state != TimeBound::State::kLocked) {
+    return std::nullopt;
+  }
+  auto device = hardware ? platform::ClockDevice::open_phc_of(kernel, given.interface,
+                                                              platform::ClockAccess::kRead)
+                         : platform::ClockDevice::open_system(kernel, platform::ClockAccess::kRead);
+  const auto now = device ? device->read_clock() : std::nullopt;
+  if (!now) return std::nullopt;
+  // The system clock shows UTC.
+  const Duration scale =
+      Duration{std::chrono::seconds{hardware || !port.follows_tai() ? 0 : given.utc_offset}};
+  const Duration offset =
+      LocalTime::from_ns(*now).since_epoch() + scale - reference.time.since_epoch();
+  return abs(offset) > Duration{config.largest_offset} ? std::optional(offset) : std::nullopt;
 }
 
 /// What the port, the wire and the clock that would be steered have shown.
@@ -207,11 +232,11 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
 
 }  // namespace
 
-Examination examine(platform::Kernel& kernel, PtpOptions given) {
+Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   const bool steers = given.clock != ClockKind::kVirtual;
   const bool any_epoch = given.epoch.any_epoch;
   const bool system = given.clock == ClockKind::kSystem;
-  PtpOptions options = quiet(std::move(given));
+  PtpOptions options = quiet(given);
   // Switching the adapter's stamps on, or to another filter, may take them from a program that
   // runs. An adapter without any is left to say so.
   const auto adapter = platform::interface_capabilities(kernel, options.interface);
@@ -239,8 +264,11 @@ Examination examine(platform::Kernel& kernel, PtpOptions given) {
   WireWatch wire(options.interface, identity->clock);
   PtpReceiver port(kernel, options, log, std::move(clocks->timestamps), facts, nullptr);
   (void)port.run();
+  const auto far =
+      steers ? first_offset(kernel, given, facts.hardware_stamps && !system, port) : std::nullopt;
   diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr, options);
   seen.steers_real_clock = steers && !any_epoch;
+  seen.first_offset = far;
   result.wire_unheard = wire.error();
   const diagnosis::Talkers& talkers = seen.on_wire ? *seen.on_wire : seen.at_port;
   result.heard.assign(talkers.all().begin(), talkers.all().end());

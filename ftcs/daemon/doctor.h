@@ -21,6 +21,6 @@ struct Examination {
 /// Follows the transmitter for options.duration with a virtual clock, whatever clock the options
 /// name, and listens to all frames of the interface meanwhile. No clock of the machine is touched;
 /// what is sent is Delay_Req or Pdelay_Req, from a port of its own number.
-[[nodiscard]] Examination examine(platform::Kernel& kernel, PtpOptions options);
+[[nodiscard]] Examination examine(platform::Kernel& kernel, const PtpOptions& options);
 
 }  // namespace ftcs::daemon

@@ -2,10 +2,8 @@
 #include "ftcs/daemon/follower_record.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <utility>
 
 #include "ftcs/daemon/real_clock.h"
@@ -112,24 +110,25 @@ FollowerRecord::FollowerRecord(const PtpOptions& options, Log& log, StateKeeper&
       start_(start),
       label_(std::move(label)) {}
 
-std::optional<std::string> FollowerRecord::add(const node::Steered& steered, FreeRunningTime now,
-                                               std::optional<Duration> sync_interval) {
+void FollowerRecord::begin() {
+  std::fflush(stdout);  // from here on lines go by the writer
+  if (options_.output == Output::kCsv) samples_.write(csv_header() + "\n");
+}
+
+void FollowerRecord::add(const node::Steered& steered, FreeRunningTime now,
+                         std::optional<Duration> sync_interval) {
   const Telemetry& telemetry = steered.telemetry;
   const bool used = telemetry.verdict == SampleVerdict::kUsed;
   const double time_s = (now - start_).seconds();
   if (!used) keep_refusal(steered, time_s);
-  if (!steered.paces) return std::nullopt;
-  std::optional<std::string> failure;
-  if (telemetry.direction == Direction::kForward) {
-    failure = add_sync(steered, time_s, sync_interval);
-  }
+  if (!steered.paces) return;
+  if (telemetry.direction == Direction::kForward) add_sync(steered, time_s, sync_interval);
   follow_lock(now);
   if (used && telemetry.locked) state_.note(telemetry.servo, now);
-  return failure;
 }
 
-std::optional<std::string> FollowerRecord::add_sync(const node::Steered& steered, double time_s,
-                                                    std::optional<Duration> sync_interval) {
+void FollowerRecord::add_sync(const node::Steered& steered, double time_s,
+                              std::optional<Duration> sync_interval) {
   const Telemetry& telemetry = steered.telemetry;
   const bool used = telemetry.verdict == SampleVerdict::kUsed;
   SampleRecord record;
@@ -144,7 +143,7 @@ std::optional<std::string> FollowerRecord::add_sync(const node::Steered& steered
     last_used_ = steered.event;
   }
   if (watch_ != nullptr && record.offset_known) watch_->add(watch_point(record));
-  return report(record, sync_interval);
+  report(record, sync_interval);
 }
 
 // Of a clock that refuses, what may pass is a warning; what will not ends the run.
@@ -228,8 +227,7 @@ FollowerRecord::Status FollowerRecord::status(FreeRunningTime now) const {
   return status;
 }
 
-std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
-                                                  std::optional<Duration> sync_interval) {
+void FollowerRecord::report(const SampleRecord& record, std::optional<Duration> sync_interval) {
   switch (options_.output) {
     case Output::kText:
       break;
@@ -240,18 +238,17 @@ std::optional<std::string> FollowerRecord::report(const SampleRecord& record,
       samples_.write(csv_line(record) + "\n");
       break;
   }
-  if (samples_.error() == EPIPE) return "standard output: nobody reads it any more";
+  // A reader that goes away, such as head, ends nothing that keeps a clock.
   if (samples_.error() != 0 && !std::exchange(output_failed_, true)) {
     log_(LogLevel::kWarning, "standard output: {}; samples are lost, the clock is steered on",
-         std::strerror(samples_.error()));
+         platform::write_failure(samples_.error()));
   }
   if (const std::uint64_t lost = samples_.take_lost(); lost > 0) {
     log_(LogLevel::kWarning, "standard output: {} samples lost, nobody reads them", lost);
   }
-  if (!record.offset_known) return std::nullopt;
+  if (!record.offset_known) return;
   summary_.add(record);
   report_text(record, sync_interval);
-  return std::nullopt;
 }
 
 void FollowerRecord::report_text(const SampleRecord& record,

@@ -26,9 +26,12 @@ class FollowerRecord {
   FollowerRecord(const PtpOptions& options, Log& log, StateKeeper& state,
                  const ClockDiscipline& discipline, FreeRunningTime start, std::string label);
 
-  /// Returns why the run must end, if it must. `sync_interval`: of the source, where it is known.
-  [[nodiscard]] std::optional<std::string> add(const node::Steered& steered, FreeRunningTime now,
-                                               std::optional<Duration> sync_interval);
+  /// Before the first sample.
+  void begin();
+  /// `sync_interval`: of the source, where it is known.
+  void add(const node::Steered& steered, FreeRunningTime now,
+           std::optional<Duration> sync_interval);
+  /// Returns why the run must end, if it must.
   [[nodiscard]] std::optional<std::string> add(const node::Note& note);
   /// Once per turn of the loop.
   void follow_lock(FreeRunningTime now);
@@ -63,10 +66,9 @@ class FollowerRecord {
   [[nodiscard]] Status status(FreeRunningTime now) const;
 
  private:
-  [[nodiscard]] std::optional<std::string> add_sync(const node::Steered& steered, double time_s,
-                                                    std::optional<Duration> sync_interval);
-  [[nodiscard]] std::optional<std::string> report(const SampleRecord& record,
-                                                  std::optional<Duration> sync_interval);
+  void add_sync(const node::Steered& steered, double time_s,
+                std::optional<Duration> sync_interval);
+  void report(const SampleRecord& record, std::optional<Duration> sync_interval);
   [[nodiscard]] bool has_room_for_line(double time_s);
   void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
   void keep_refusal(const node::Steered& steered, double time_s);

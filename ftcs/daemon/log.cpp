@@ -61,6 +61,10 @@ void Log::write(LogLevel level, std::string_view text) {
     lines_.write(line(fmt::format("{} lines lost: nobody read them", std::exchange(lost_, 0))));
   }
   lines_.write(line(text));
+  if (lines_.error() != 0 && !std::exchange(failed_, true)) {
+    errors_.write(line(fmt::format("standard output: {}; lines are lost, the program goes on",
+                                   platform::write_failure(lines_.error()))));
+  }
 }
 
 void Log::flush() {

@@ -62,6 +62,7 @@ class Log {
   std::int64_t room_at_ns_ = 0;
   std::uint64_t left_out_ = 0;
   std::uint64_t lost_ = 0;
+  bool failed_ = false;  ///< the stream could not be written, which has been said
 };
 
 }  // namespace ftcs::daemon

@@ -48,8 +48,7 @@ std::optional<platform::OsError> MonitorReceiver::open_source() {
 }
 
 void MonitorReceiver::start(FreeRunningTime now) {
-  if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
-  std::fflush(stdout);
+  follower_.begin();
   last_report_ = now;
   follower_.set_watch(watch());
   log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",

@@ -27,6 +27,7 @@ DisciplineCounters since(const DisciplineCounters& now, const DisciplineCounters
   counted.used = since(now.used, then.used);
   counted.rejected = since(now.rejected, then.rejected);
   counted.duplicate = since(now.duplicate, then.duplicate);
+  counted.refused = since(now.refused, then.refused);
   counted.implausible = since(now.implausible, then.implausible);
   return counted;
 }

@@ -48,8 +48,7 @@ PtpReceiver::PtpReceiver(platform::Kernel& kernel, const PtpOptions& options, Lo
 }
 
 void PtpReceiver::start(FreeRunningTime now) {
-  if (options().output == Output::kCsv) fmt::print("{}\n", csv_header());
-  std::fflush(stdout);
+  record_.begin();
   record_.set_watch(watch());
   node_.start(now);
   take_events(now);
@@ -105,7 +104,7 @@ void PtpReceiver::take(const node::ReceiverEvent& event, FreeRunningTime now) {
   } else if (const auto* note = std::get_if<node::Note>(&event)) {
     if (const auto wrong = record_.add(*note)) fail(*wrong);
   } else if (const auto* steered = std::get_if<node::Steered>(&event)) {
-    if (const auto wrong = record_.add(*steered, now, node_.port().sync_interval())) fail(*wrong);
+    record_.add(*steered, now, node_.port().sync_interval());
     if (steered->paces) feed_others(record_);
   }
 }
@@ -215,8 +214,16 @@ WatchState PtpReceiver::watched() {
 }
 
 void PtpReceiver::log_findings(LogLevel level) {
+  // The first one is why; the others may matter once it is mended.
+  bool decisive = true;
   for (const diagnosis::Finding& finding : diagnosis::diagnose_all(seen(now()))) {
-    log()(level, "{}", diagnosis::sentence(finding));
+    if (decisive) {
+      log()(level, "{}", diagnosis::sentence(finding));
+    } else {
+      log()(level, "also: {}{}{}", finding.seen, finding.expected.empty() ? "" : "; expected ",
+            finding.expected);
+    }
+    decisive = false;
   }
 }
 

@@ -32,6 +32,11 @@ class PtpReceiver : public PtpPort, private Managed {
   [[nodiscard]] TimeBound time() const {
     return time_bound(node_.discipline().latest(), node_.discipline().samples());
   }
+  /// Whether the reference says that it shows TAI.
+  [[nodiscard]] bool follows_tai() const {
+    const ptp::TransmitterData* const selected = node_.port().transmitter();
+    return selected != nullptr && (selected->flags & ptp::flag::kPtpTimescale) != 0;
+  }
   /// Whom it follows; none: nobody.
   [[nodiscard]] std::optional<ptp::PortIdentity> transmitter() const {
     const ptp::TransmitterData* const selected = node_.port().transmitter();

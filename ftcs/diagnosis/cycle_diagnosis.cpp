@@ -39,6 +39,8 @@ constexpr std::array kAdvice{
            "--sync0-phase nearer to 0.5, a longer --cycle, or a host that is less late"},
     Advice{Cause::kDrivesNotOperational, "all drives in OP",
            "the lines of the log tell which drive and its AL status code"},
+    Advice{Cause::kAxisFault, "axes that obey",
+           "object 0x603F of that drive tells why; --reset-faults 1 resets it once"},
 };
 
 Advice advice(Cause cause) noexcept {
@@ -73,6 +75,9 @@ std::size_t write_seen(std::span<char> text, Cause cause, const CycleSeen& seen)
     case Cause::kDrivesNotOperational:
       return write(FMT_STRING("a drive is not in OP, working counter {} of {}"),
                    seen.working_counter, seen.expected_counter);
+    case Cause::kAxisFault:
+      return write(FMT_STRING("{} of {} axes in Fault (CiA 402), the first is that of drive {}"),
+                   seen.axes_in_fault, seen.drives, seen.first_in_fault);
     case Cause::kOther:
       return write(FMT_STRING("{}"), ethercat::name(seen.failure));
     default:
@@ -128,7 +133,8 @@ Cause cause_of(const CycleSeen& seen) noexcept {
   if (is_often(seen.late, seen.cycles)) return Cause::kHostLate;
   if (is_narrow(seen)) return Cause::kMarginTooSmall;
   if (seen.state != CycleState::kLocked) return Cause::kAcquiring;
-  return seen.operational ? Cause::kLocked : Cause::kDrivesNotOperational;
+  if (!seen.operational) return Cause::kDrivesNotOperational;
+  return seen.axes_in_fault > 0 ? Cause::kAxisFault : Cause::kLocked;
 }
 
 std::string_view write_sentence(std::span<char> text, const CycleSeen& seen) {

@@ -22,6 +22,8 @@ struct CycleSeen {
   std::uint16_t working_counter = 0;
   std::uint16_t expected_counter = 0;
   bool operational = true;  ///< all drives are in OP
+  std::uint16_t axes_in_fault = 0;
+  std::uint16_t first_in_fault = 0;  ///< of them, its position on the wire
   std::uint64_t cycles = 0;
   std::uint64_t lost = 0;  ///< frames
   std::uint64_t late = 0;  ///< cycles that began later than the gate
@@ -32,8 +34,9 @@ struct CycleSeen {
 };
 
 /// What stands between the cycle and its lock; kLocked: nothing. Of a locked cycle kMarginTooSmall
-/// if its frames hardly arrive before SYNC0, kDrivesNotOperational if a drive is not in OP.
-/// Like the two below, for the cyclic path: no heap.
+/// if its frames hardly arrive before SYNC0, kDrivesNotOperational if a drive is not in OP,
+/// kAxisFault if one is, and its axis does not move. Like the two below, for the cyclic path: no
+/// heap.
 [[nodiscard]] Cause cause_of(const CycleSeen& seen) noexcept;
 /// "locked: ...", or "not locked: ...; expected ...; ...", at most text.size() characters. A cycle
 /// that is locked and has a cause nevertheless is "in phase, but ...; expected ...; ...".

@@ -49,6 +49,12 @@ const std::array kCases{
     Case{Cause::kOther, [](CycleSeen& s) { s.failure = ethercat::FailureKind::kInOperation; },
          ethercat::name(ethercat::FailureKind::kInOperation)},
     Case{Cause::kAcquiring, [](CycleSeen& s) { s.state = CycleState::kAcquiring; }, "phase"},
+    Case{Cause::kAxisFault,
+         [](CycleSeen& s) {
+           s.axes_in_fault = 2;
+           s.first_in_fault = 3;
+         },
+         "2 of 8 axes in Fault (CiA 402), the first is that of drive 3"},
     Case{Cause::kDrivesNotOperational, [](CycleSeen& s) { s.operational = false; }, "AL status"},
 };
 

@@ -50,6 +50,7 @@ std::string_view name(Cause cause) noexcept {
       "host_late",
       "margin_too_small",
       "drives_not_operational",
+      "axis_fault",
       "other",
   };
   return kNames[static_cast<std::size_t>(cause)];

@@ -58,7 +58,8 @@ enum class Cause : std::uint8_t {
   kHostLate,
   kMarginTooSmall,
   kDrivesNotOperational,
-  kOther,  ///< a failure with a text of its own
+  kAxisFault,  ///< CiA 402: statusword in the state Fault
+  kOther,      ///< a failure with a text of its own
 };
 inline constexpr std::size_t kCauses = static_cast<std::size_t>(Cause::kOther) + 1;
 

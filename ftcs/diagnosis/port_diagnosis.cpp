@@ -34,6 +34,7 @@ std::vector<Finding> diagnose_all(const PortSeen& seen) {
   if (seen.locked) {
     auto steered = other_steers(seen);
     if (steered && !seen.clock.empty()) all.push_back(std::move(*steered));
+    if (auto far = far_at_start(seen)) all.push_back(std::move(*far));
     if (all.empty()) all.push_back({Cause::kLocked, figures(seen), "", ""});
   } else {
     const auto rules = seen.has_transmitter ? rules_of_measuring() : rules_of_hearing();

@@ -48,8 +48,10 @@ struct PortSeen {
   bool path_delay_known = false;
   ServoSnapshot servo{};
   Rate rate{};
-  DisciplineCounters samples{};         ///< lately
-  bool steers_real_clock = false;       ///< one would be, were this not a trial
+  DisciplineCounters samples{};    ///< lately
+  bool steers_real_clock = false;  ///< one would be, were this not a trial
+  /// Of the real clock that would be steered from the reference, where no step is allowed.
+  std::optional<Duration> first_offset{};
   std::optional<std::int64_t> utc_s{};  ///< by the system clock, where it is to be compared
   std::string refusal{};                ///< why the reference's time is not believed; empty: it is
 };

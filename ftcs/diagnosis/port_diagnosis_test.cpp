@@ -196,8 +196,28 @@ std::vector<Case> measured() {
   };
 }
 
+std::vector<Case> too_far() {
+  return {
+      {Cause::kFirstOffset,
+       with(followed(),
+            [](PortSeen& s) {
+              s.samples.refused = 5;
+              s.servo.offset = Duration::from_ns(-37e9);
+            }),
+       "-37.000 s from the reference, and without a step no more than 1 s is removed"},
+      {Cause::kFirstOffset,
+       with(followed(),
+            [](PortSeen& s) {
+              s.locked = true;  // the virtual clock of a trial is
+              s.clock = "CLOCK_REALTIME";
+              s.first_offset = Duration::from_ns(5e9);
+            }),
+       "CLOCK_REALTIME is +5.000 s"},
+  };
+}
+
 TEST(PortDiagnosis, each_cause_has_its_sentence_and_none_says_locked) {
-  for (const auto& cases : {heard(), refused(), measured()}) {
+  for (const auto& cases : {heard(), refused(), measured(), too_far()}) {
     for (const Case& one : cases) {
       const Finding found = diagnose(one.seen);
       const std::string text = sentence(found);

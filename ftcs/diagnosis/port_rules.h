@@ -28,6 +28,8 @@ using PortRule = std::optional<Finding> (*)(const PortSeen& seen);
 [[nodiscard]] std::vector<Finding> remarks(const PortSeen& seen);
 /// Another program changes the clock that is steered.
 [[nodiscard]] std::optional<Finding> other_steers(const PortSeen& seen);
+/// The real clock is too far from the reference, and nobody allows a step.
+[[nodiscard]] std::optional<Finding> far_at_start(const PortSeen& seen);
 /// The neighbour of a port that measures peer to peer does not answer.
 [[nodiscard]] std::optional<Finding> no_peer(const PortSeen& seen);
 

@@ -95,6 +95,23 @@ Found timescale(const PortSeen& seen) {
   return Finding{Cause::kTimescale, seen.refusal, "", ""};
 }
 
+Finding too_far(Duration offset, const PortSeen& seen) {
+  const bool is_virtual = seen.clock.empty();
+  return Finding{
+      Cause::kFirstOffset,
+      fmt::format(
+          "{} is {:+.3f} s from the reference, and without a step no more than 1 s is removed",
+          is_virtual ? "the virtual clock" : seen.clock, offset.seconds()),
+      "a clock near the reference at the start",
+      is_virtual
+          ? "--first-step allows one step; --offset 37s begins on TAI, where the reference is"
+          : "--first-step allows one step, or set the clock before"};
+}
+
+Found first_offset(const PortSeen& seen) {
+  return seen.samples.refused > 0 ? Found(too_far(seen.servo.offset, seen)) : std::nullopt;
+}
+
 Found no_transmit_stamps(const PortSeen& seen) {
   const std::uint64_t missing = seen.counters[Counter::kMissingTransmitStamp];
   if (seen.path_delay_known || missing == 0) return std::nullopt;
@@ -164,6 +181,10 @@ std::optional<Finding> other_steers(const PortSeen& seen) {
       seen.locked};
 }
 
+std::optional<Finding> far_at_start(const PortSeen& seen) {
+  return seen.first_offset ? Found(too_far(*seen.first_offset, seen)) : std::nullopt;
+}
+
 std::optional<Finding> no_peer(const PortSeen& seen) {
   if (!seen.settings.peer_to_peer || seen.peer_delay) return std::nullopt;
   if (seen.counters[Counter::kMissingTransmitStamp] > 0 &&
@@ -182,9 +203,10 @@ std::optional<Finding> no_peer(const PortSeen& seen) {
 }
 
 std::span<const PortRule> rules_of_measuring() noexcept {
-  static constexpr std::array<PortRule, 11> kRules{
-      link_down, no_receive_stamps,  no_sync,         no_follow_up, two_transmitters, timescale,
-      no_peer,   no_transmit_stamps, no_delay_answer, other_steers, samples_refused,
+  static constexpr std::array<PortRule, 12> kRules{
+      link_down,        no_receive_stamps, no_sync,      no_follow_up,
+      two_transmitters, timescale,         no_peer,      no_transmit_stamps,
+      no_delay_answer,  first_offset,      other_steers, samples_refused,
   };
   return kRules;
 }

@@ -74,7 +74,7 @@ void CycleFigureWatch::judge(const node::CycleNode& node) {
   const ethercat::CycleReport& report = node.main().last_cycle();
   if (settled && node.main().complete() && report.inputs_valid) {
     figures_.worst_difference_ns =
-        std::max(figures_.worst_difference_ns, report.difference_bound_ns);
+        std::max(figures_.worst_difference_ns.value_or(0), report.difference_bound_ns);
   }
 }
 

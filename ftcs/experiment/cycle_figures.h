@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "ftcs/analysis/quantile_sketch.h"
@@ -37,8 +38,9 @@ struct CycleFigures {
   std::uint64_t late_windows = 0;  ///< SYNC0 events that a wake-up was too late for, for each drive
   std::int64_t lock_cycle = -1;
   std::int64_t op_cycle = -1;
-  LockWatch lock;                         ///< how it came and went
-  std::uint32_t worst_difference_ns = 0;  ///< bound of |0x092C|, from one second after the lock on
+  LockWatch lock;  ///< how it came and went
+  /// Bound of |0x092C|, from one second after the lock on; none: no such cycle was judged.
+  std::optional<std::uint32_t> worst_difference_ns{};
   QuantileSketch lateness;
   QuantileSketch phase;
   QuantileSketch wire_phase;         ///< of the frame itself, lateness included

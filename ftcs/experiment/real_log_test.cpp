@@ -60,8 +60,9 @@ TEST(RealLog, ptp4l_from_its_start_over_the_step) {
   expect_followed(log, 1000.0);
 }
 
-// ptp4l with summary_interval: 18 summaries while it listens (frequency 0), one with the step in it,
-// then of a clock that is steered. Its frequency is the oscillator's but for what the servo does.
+// ptp4l with summary_interval: 18 summaries while it listens (frequency 0), one with the step in
+// it, then of a clock that is steered. Its frequency is the oscillator's but for what the servo
+// does.
 TEST(RealLog, ptp4l_summaries_begin_where_the_clock_is_steered) {
   const RecordedLog log = read("ptp4l-summaries.log");
   EXPECT_EQ(log.format, "ptp4l");

@@ -84,6 +84,11 @@ diagnosis::CycleSeen CycleObserver::seen(const node::CycleNode& node,
   seen.working_counter = report.working_counter;
   seen.expected_counter = report.whole;
   seen.operational = report.all_operational();
+  for (std::size_t n = seen.drives; n-- > 0;) {
+    if (node.axes()[n].state() != ethercat::AxisState::kFault) continue;
+    ++seen.axes_in_fault;
+    seen.first_in_fault = static_cast<std::uint16_t>(n);
+  }
   seen.cycles = figures.cycles - older_.cycles;
   seen.lost = main.counters().lost - older_.lost;
   seen.late = node.servo().counters().late - older_.late;
@@ -121,6 +126,7 @@ void CycleObserver::publish(const node::CycleNode& node, const experiment::Cycle
   state_.cycle.margin_ns = now.margin_ns;
   state_.cycle.working_counter = now.working_counter;
   state_.cycle.expected_counter = now.expected_counter;
+  state_.cycle.axes_in_fault = now.axes_in_fault;
   state_.cycle.lost = node.main().counters().lost;
   state_.cycle.late = counters.late;
   describe_drives(node, now.margin_ns);

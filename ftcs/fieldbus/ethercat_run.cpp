@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <functional>
 #include <memory>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -85,15 +86,17 @@ int run_scan(MainRunner& runner, const std::function<bool()>& stop) {
   return kSuccess;
 }
 
-void print_setup(const platform::RealtimeSetup& setup, const RunOptions& options) {
+void say_setup(MainRunner& runner, const platform::RealtimeSetup& setup) {
+  const RunOptions& options = runner.options();
   const auto got = [](bool obtained) { return obtained ? "obtained" : "refused"; };
-  fmt::print("SCHED_FIFO {} {}, mlockall {}, pinned to a processor {}, no sleep states {}\n",
-             options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
-             got(setup.memory_locked), options.cpu >= 0 ? got(setup.pinned) : "not asked for",
-             got(setup.latency_held));
+  runner.say(fmt::format(
+      "SCHED_FIFO {} {}, mlockall {}, pinned to a processor {}, no sleep states {}\n",
+      options.priority, options.priority > 0 ? got(setup.priority_set) : "not asked for",
+      got(setup.memory_locked), options.cpu >= 0 ? got(setup.pinned) : "not asked for",
+      got(setup.latency_held)));
   if (options.spin > Nanoseconds{0}) {
-    fmt::print("the last {} us before each cycle keep a processor busy\n",
-               options.spin.count() / 1000);
+    runner.say(fmt::format("the last {} us before each cycle keep a processor busy\n",
+                           options.spin.count() / 1000));
   }
 }
 
@@ -120,26 +123,45 @@ std::optional<std::string> drive_that_is_not_there(const RunOptions& options, st
 }
 
 /// Null: nobody can ask. Another run, on another wire, may have the usual place.
-Result<std::unique_ptr<RunStatus>, std::string> open_status(const RunOptions& options) {
+Result<std::unique_ptr<RunStatus>, std::string> open_status(MainRunner& runner) {
+  const RunOptions& options = runner.options();
   if (options.status_socket.empty()) return std::unique_ptr<RunStatus>{};
   auto status = RunStatus::open(options);
   if (status) return std::move(*status);
   if (options.status_socket_given) return status.error().message();
-  if (!options.quiet) fmt::print("no status socket: {}\n", status.error().message());
+  if (!options.quiet) runner.say(fmt::format("no status socket: {}\n", status.error().message()));
   return std::unique_ptr<RunStatus>{};
+}
+
+/// The figures for a person; those of --json do not hang on whether anybody reads these. False: the
+/// disk is full, or the like.
+bool try_print_run(const MainRunner& runner) {
+  int number = 0;
+  try {
+    print_run(runner);
+    if (std::fflush(stdout) != 0) number = errno;
+  } catch (const std::system_error& error) {
+    number = error.code().value();
+  }
+  if (number == 0) return true;
+  std::clearerr(stdout);  // said here
+  if (number == EPIPE) return true;
+  end_with(fmt::format("cannot write to standard output: {}", platform::write_failure(number)),
+           kRuntimeError);
+  return false;
 }
 
 int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const RunOptions& options = runner.options();
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
   if (const auto unknown = runner.await_plant_time(stop)) return end_with(*unknown, kNotLocked);
-  const auto status = open_status(options);
+  const auto status = open_status(runner);
   if (!status) return end_with(status.error(), kRuntimeError);
   if (*status) runner.tell(**status);
   if (const auto wrong = runner.open_watch()) return end_with(*wrong, kRuntimeError);
-  if (options.watch.is_wanted()) fmt::print("{}\n", runner.watched_at());
+  if (options.watch.is_wanted()) runner.say(runner.watched_at() + "\n");
   const auto setup = platform::make_realtime(options.priority, options.cpu);
-  if (!options.quiet) print_setup(setup, options);
+  if (!options.quiet) say_setup(runner, setup);
   if (!runner.bring_up(stop, false)) {
     // What cannot be put on plant time says so itself, in one sentence.
     const bool diagnosed = runner.main().failure() && options.plant_time.empty();
@@ -150,19 +172,19 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
     return end_with(*wrong, kRuntimeError);
   }
   runner.run(stop);
-  if (!options.quiet) print_run(runner);
+  const bool printed = options.quiet || try_print_run(runner);
   // The figures are written even if a record is cut short, and whatever ended the run.
   const auto reports = write_reports(runner);
   const auto csv = runner.finish_csv();
   if (csv) end_with(csv->message + " (the run went on without it)", kRuntimeError);
   if (reports) end_with(reports->message, kRuntimeError);
   if (runner.main().failure()) return end_with(runner.main().failure(), options);
-  if (csv || reports) return kRuntimeError;
+  if (csv || reports || !printed) return kRuntimeError;
   const std::string_view sentence = runner.sentence();
   if (!sentence.starts_with("locked")) end_with(std::string(sentence), kNotLocked);
   if (runner.decision().state != CycleState::kLocked) return kNotLocked;
   const ethercat::CycleReport& last = runner.main().last_cycle();
-  if (last.working_counter < last.whole) return kNotLocked;
+  if (last.working_counter < last.whole || runner.seen().axes_in_fault > 0) return kNotLocked;
   if (last.all_operational()) return kSuccess;
   return end_with("not every drive was in OP at the end: the lines above and --json tell which",
                   kNotLocked);

@@ -2,6 +2,9 @@
 #include "ftcs/fieldbus/main_runner.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -129,8 +132,7 @@ bool MainRunner::bring_up(const std::function<bool()>& stop, bool scan_only) {
     if (stop()) return false;
     if (stage != main().stage() && !options_.quiet && !scan_only) {
       stage = main().stage();
-      fmt::print("{} ...\n", ethercat::name(stage));
-      std::fflush(stdout);
+      say(fmt::format("{} ...\n", ethercat::name(stage)));
     }
     exchange();
   }
@@ -143,15 +145,10 @@ void MainRunner::run(const std::function<bool()>& stop) {
   watch_.reserve(*node_, start);
   next_line_ = start + Duration{kLineInterval};
   node_->start(now());
-  try {
-    while (!stop() && node_->cyclic()) {
-      const double elapsed_s = (now() - start).seconds();
-      if (options_.duration_s > 0.0 && elapsed_s > options_.duration_s) break;
-      cycle();
-    }
-  } catch (...) {  // live lines that cannot be printed
-    stop_drives();
-    throw;
+  while (!stop() && node_->cyclic()) {
+    const double elapsed_s = (now() - start).seconds();
+    if (options_.duration_s > 0.0 && elapsed_s > options_.duration_s) break;
+    cycle();
   }
   stop_drives();
 }
@@ -181,9 +178,9 @@ void MainRunner::cycle() {
   if (now() >= next_line_) {
     next_line_ = next_line_ + Duration{kLineInterval};
     if (status_ != nullptr) {
-      status_->publish(RunSnapshot::of(*node_, observer_.seen(*node_, figures())));
+      status_->publish(RunSnapshot::of(*node_, seen()));
     }
-    if (!options_.quiet) print_live();
+    if (!options_.quiet) say_live();
   }
 }
 
@@ -197,25 +194,37 @@ std::string_view MainRunner::service_sentence() {
   return observer_.sentence(sentence_, *node_, figures());
 }
 
-void MainRunner::print_live() const {
+void MainRunner::say(std::string_view lines) {
+  std::fflush(stdout);  // the rest of the program prints by its buffer
+  lines_.write(lines);
+  if (lines_.error() == 0 || std::exchange(output_failed_, true)) return;
+  fmt::print(stderr, "ftcs ethercat: standard output: {}; the run goes on\n",
+             platform::write_failure(lines_.error()));
+}
+
+void MainRunner::say_live() {
   const ethercat::CycleReport& report = main().last_cycle();
   const double rate = decision().rate.ratio();
   const std::size_t worst = clocks().worst(main().network().count);
-  fmt::print(
-      "margin {:7.1f} us  {:9} (first after {})  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle "
-      "{:.6f} ms  "
-      "wkc {}/{}  al 0x{:02X}  |0x092C| {} ns (drive {})  lost {}  late {}\n",
+  fmt::memory_buffer text;  // what fits needs no heap
+  const auto add = [&text](auto... arguments) {
+    fmt::format_to(std::back_inserter(text), arguments...);
+  };
+  add(FMT_STRING(
+          "margin {:7.1f} us  {:9} (first after {})  phase {:+8.3f} us  rate {:+9.3f} ppm  cycle "
+          "{:.6f} ms  "
+          "wkc {}/{}  al 0x{:02X}  |0x092C| {} ns (drive {})  lost {}  late {}\n"),
       figures().margin.quantile(0.5) * 1e-3, name(decision().state), figures().lock_cycle,
       decision().phase_error.ns() * 1e-3, decision().rate.ppm(),
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
       report.expected, report.states, clocks()[worst].last, worst, main().counters().lost,
       servo_counters().late);
   if (!options_.plant_time.empty()) {
-    fmt::print("bus {:9}  dc to plant {:+12.3f} us (sigma {:.3f})  bus rate {:+9.3f} ppm\n",
-               ftcs::name(bus().state), bus().dc_to_plant.ns() * 1e-3, bus().sigma_ns * 1e-3,
-               bus().rate_ppb * 1e-3);
+    add(FMT_STRING("bus {:9}  dc to plant {:+12.3f} us (sigma {:.3f})  bus rate {:+9.3f} ppm\n"),
+        ftcs::name(bus().state), bus().dc_to_plant.ns() * 1e-3, bus().sigma_ns * 1e-3,
+        bus().rate_ppb * 1e-3);
   }
-  std::fflush(stdout);
+  say({text.data(), text.size()});
 }
 
 }  // namespace ftcs::daemon

@@ -17,6 +17,7 @@
 #include "ftcs/fieldbus/run_status.h"
 #include "ftcs/node/cycle_node.h"
 #include "ftcs/platform/ethercat_link.h"
+#include "ftcs/platform/line_writer.h"
 
 namespace ftcs::daemon {
 
@@ -46,6 +47,9 @@ class MainRunner {
   /// Returns what is wrong, or nothing.
   [[nodiscard]] std::optional<std::string> open_watch() { return observer_.open(); }
   [[nodiscard]] std::string watched_at() const { return observer_.where(); }
+  /// To standard output, as far as somebody takes it: lines end no run, whatever becomes of them.
+  void say(std::string_view lines);
+  [[nodiscard]] diagnosis::CycleSeen seen() const { return observer_.seen(*node_, figures()); }
   /// "locked: ..." or "not locked: ...".
   [[nodiscard]] std::string_view sentence() { return service_sentence(); }
   /// Until the cyclic stage. False: main().failure() tells why (or stopped by a signal).
@@ -67,7 +71,7 @@ class MainRunner {
   void exchange();
   void cycle();
   void stop_drives();
-  void print_live() const;
+  void say_live();
   /// Of the clock that the link's stamps are of.
   [[nodiscard]] FreeRunningTime now() const noexcept { return link_.clock().now(); }
   [[nodiscard]] std::optional<ReferenceTime> plant_now(FreeRunningTime now);
@@ -84,6 +88,8 @@ class MainRunner {
   RunStatus* status_ = nullptr;
   ServiceReport service_;
   CycleObserver observer_;
+  platform::LineWriter lines_{stdout};
+  bool output_failed_ = false;        ///< which has been said
   std::array<char, 480> sentence_{};  ///< the cyclic path touches no heap
 };
 

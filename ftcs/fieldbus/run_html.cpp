@@ -106,7 +106,8 @@ Table runs_table(std::span<const MainRunner* const> runs) {
          fmt::format("{} of {}", figures.working_counter_right, figures.cycles),
          Cell::count(run->main().counters().lost), Cell::count(figures.host_stalls),
          fmt::format("{:.2f} %", 100.0 * excluded),
-         locked ? fmt::format("< {} ns", figures.worst_difference_ns + 1) : "-"});
+         figures.worst_difference_ns ? fmt::format("< {} ns", *figures.worst_difference_ns + 1)
+                                     : "-"});
   }
   return table;
 }

@@ -19,6 +19,7 @@ void print_quantiles(const char* title, const QuantileSketch& sketch, bool absol
   const auto at = [&](double fraction) {
     return 1e-3 * (absolute ? sketch.absolute_quantile(fraction) : sketch.quantile(fraction));
   };
+  if (sketch.count() == 0) return fmt::print("{:<28} not judged\n", title);
   fmt::print("{:<28} p50 {:9.3f}  p90 {:9.3f}  p99 {:9.3f}  p99.9 {:9.3f}  max {:9.3f} us\n", title,
              at(0.5), at(0.9), at(0.99), at(0.999), at(1.0));
 }
@@ -36,15 +37,16 @@ Json drives_json(const MainRunner& runner) {
   Json drives = Json::array();
   for (const ethercat::SubDeviceInfo& device : runner.main().network().all()) {
     const node::DriveClocks::Seen& clock = runner.clocks()[drives.size()];
-    drives.push_back(Json{{"station", device.station},
-                          {"name", device.sii.device_name.data()},
-                          {"state", ethercat::name(device.state)},
-                          {"al_status_code", static_cast<unsigned>(device.code)},
-                          {"al_status", ethercat::name(device.code)},
-                          {"propagation_delay_ns", device.propagation_delay},
-                          {"system_time_difference_ns", clock.last},
-                          {"largest_difference_ns", clock.largest},
-                          {"differences_beyond_limit", clock.beyond}});
+    drives.push_back(
+        Json{{"station", device.station},
+             {"name", device.sii.device_name.data()},
+             {"state", ethercat::name(device.state)},
+             {"al_status_code", static_cast<unsigned>(device.code)},
+             {"al_status", ethercat::name(device.code)},
+             {"propagation_delay_ns", device.propagation_delay},
+             {"system_time_difference_ns", clock.last},
+             {"largest_difference_ns", clock.readings > 0 ? Json(clock.largest) : Json(nullptr)},
+             {"differences_beyond_limit", clock.beyond}});
   }
   return drives;
 }
@@ -295,9 +297,13 @@ void print_run(const MainRunner& runner) {
   print_quantiles("round trip", figures.round_trip, false);
   print_quantiles("margin to SYNC0", figures.margin, false);
   print_histograms(figures);
-  fmt::print("|0x092C| from one second after the lock: under {} ns (bound)\n",
-             figures.worst_difference_ns + 1);
-  print_clocks(runner);
+  if (figures.worst_difference_ns) {
+    fmt::print("|0x092C| from one second after the lock: under {} ns (bound)\n",
+               *figures.worst_difference_ns + 1);
+    print_clocks(runner);
+  } else {
+    fmt::print("|0x092C|: not judged, there was no cycle a second after the lock\n");
+  }
   fmt::print("rate {:+.3f} ppm; resyncs {}, impossible {}, doubtful stamps {}\n",
              runner.decision().rate.ppm(), servo.resyncs, servo.impossible, servo.doubtful);
   if (!runner.options().plant_time.empty()) {
@@ -340,7 +346,8 @@ Json run_json(const MainRunner& runner) {
             {"lateness", quantiles(figures.lateness, false)},
             {"round_trip", quantiles(figures.round_trip, false)},
             {"margin", quantiles(figures.margin, false)},
-            {"system_time_difference_bound_ns", figures.worst_difference_ns},
+            {"system_time_difference_bound_ns",
+             figures.worst_difference_ns ? Json(*figures.worst_difference_ns) : Json(nullptr)},
             {"rate_ppb", runner.decision().rate.ppb()},
             {"late", servo.late},
             {"slow", servo.slow},

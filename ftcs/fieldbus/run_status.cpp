@@ -66,9 +66,11 @@ RunSnapshot RunSnapshot::of(const node::CycleNode& node, const diagnosis::CycleS
 std::string run_status(const RunOptions& options, const RunSnapshot& snapshot) {
   Json clocks = Json::array();
   for (std::size_t n = 0; n < snapshot.drives; ++n) {
-    clocks.push_back({{"system_time_difference_ns", snapshot.clocks[n].last},
-                      {"largest_difference_ns", snapshot.clocks[n].largest},
-                      {"differences_beyond_limit", snapshot.clocks[n].beyond}});
+    clocks.push_back(
+        {{"system_time_difference_ns", snapshot.clocks[n].last},
+         {"largest_difference_ns",
+          snapshot.clocks[n].readings > 0 ? Json(snapshot.clocks[n].largest) : Json(nullptr)},
+         {"differences_beyond_limit", snapshot.clocks[n].beyond}});
   }
   const Json status{
       {"interface", options.interface.empty() ? fmt::format("udp {}:{}", options.host, options.port)
@@ -86,6 +88,7 @@ std::string run_status(const RunOptions& options, const RunSnapshot& snapshot) {
       {"margin_ns", snapshot.margin_ns},
       {"working_counter", snapshot.working_counter},
       {"working_counter_expected", snapshot.expected},
+      {"axes_in_fault", snapshot.seen.axes_in_fault},
       {"lost_frames", snapshot.lost_frames},
       {"plant_time", plant_json(options, snapshot.bus)},
       {"drives", std::move(clocks)}};

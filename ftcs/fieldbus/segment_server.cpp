@@ -2,6 +2,8 @@
 #include "ftcs/fieldbus/segment_server.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -139,7 +141,25 @@ void SegmentServer::write_clock(FreeRunningTime stamp) {
   constexpr std::uint64_t kEvery = 50;
   if (!clock_csv_ || frames_ % kEvery != 0 || segment_->size() == 0) return;
   const std::uint64_t shown = (*segment_)[0].dc().system_time(on_wire(stamp));
-  fmt::print(clock_csv_.get(), "{},{}\n", stamp.since_epoch().rounded_ns(), shown);
+  try {
+    fmt::print(clock_csv_.get(), "{},{}\n", stamp.since_epoch().rounded_ns(), shown);
+  } catch (const std::system_error& error) {
+    end_clock_csv(error.code().value());
+  }
+}
+
+/// A record that cannot be kept ends no drive.
+void SegmentServer::end_clock_csv(int number) {
+  fmt::print(stderr, "ftcs ethercat-segment: cannot write {}: {}; the segment goes on without it\n",
+             options_.clock_csv, std::generic_category().message(number));
+  clock_csv_.reset();
+  record_cut_ = true;
+}
+
+/// What still lies in its buffer.
+bool SegmentServer::finish_records() {
+  if (clock_csv_ && std::fflush(clock_csv_.get()) != 0) end_clock_csv(errno);
+  return !record_cut_;
 }
 
 void SegmentServer::apply_faults(FreeRunningTime now) {

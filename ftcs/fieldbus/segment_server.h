@@ -63,6 +63,8 @@ class SegmentServer {
   void serve();
   void print_summary() const;
   [[nodiscard]] std::string json() const;
+  /// At the end: whether all that was to be recorded has been.
+  [[nodiscard]] bool finish_records();
   [[nodiscard]] const ethercat::Segment& segment() const { return *segment_; }
 
  private:
@@ -70,6 +72,7 @@ class SegmentServer {
   void build();
   [[nodiscard]] ethercat::SubDeviceConfig config_of(std::size_t n);
   void write_clock(FreeRunningTime stamp);
+  void end_clock_csv(int number);
   void apply_faults(FreeRunningTime now);
   void apply(const SegmentFault& fault, ethercat::WireTime now);
 
@@ -86,6 +89,7 @@ class SegmentServer {
   std::uint64_t dropped_ = 0;
   std::uint64_t user_stamps_ = 0;
   std::uint64_t random_ = 0;
+  bool record_cut_ = false;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> clock_csv_{nullptr, std::fclose};
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <climits>
+#include <cstring>
 
 namespace ftcs::platform {
 namespace {
@@ -56,6 +57,10 @@ void LineWriter::flush() {
 }
 
 std::uint64_t LineWriter::take_lost() { return std::exchange(lost_, 0); }
+
+const char* write_failure(int number) noexcept {
+  return number == EPIPE ? "nobody reads it any more" : std::strerror(number);
+}
 
 std::size_t terminal_columns() noexcept {
   constexpr std::size_t kUsual = 80;

@@ -39,6 +39,8 @@ class LineWriter {
   int error_ = 0;
 };
 
+/// "nobody reads it any more", or the words of that errno.
+[[nodiscard]] const char* write_failure(int number) noexcept;
 /// Width of the terminal behind standard output; 80 where that is none, or does not tell.
 [[nodiscard]] std::size_t terminal_columns() noexcept;
 

@@ -89,8 +89,12 @@ std::optional<SummaryLogLine> parse_summary_log_line(std::string_view line) {
     if (!rms || !largest || !frequency) continue;
     const bool spread_follows = i + 7 < words.size() && words[i + 6] == "+/-";
     const auto spread = spread_follows ? parse_decimal(words[i + 7]) : std::nullopt;
-    return SummaryLogLine{std::string(program_of(line)) + clock_of(words, i), bracketed_time(line),
-                          *rms, *largest, *frequency, spread};
+    return SummaryLogLine{std::string(program_of(line)) + clock_of(words, i),
+                          bracketed_time(line),
+                          *rms,
+                          *largest,
+                          *frequency,
+                          spread};
   }
   return std::nullopt;
 }

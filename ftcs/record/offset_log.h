@@ -34,10 +34,10 @@ struct OffsetLogLine {
 ///   phc2sys[5197.9]: CLOCK_REALTIME rms   12 max   30 freq  +1234 +/-   3 delay   567 +/-   1
 struct SummaryLogLine {
   std::string source;
-  std::optional<double> time_s;  ///< as above: of the end of what is summarized
-  double rms_ns = 0.0;           ///< of the offsets
-  double max_ns = 0.0;           ///< the largest |offset|
-  double frequency_ppb = 0.0;    ///< mean of the applied ones
+  std::optional<double> time_s;                  ///< as above: of the end of what is summarized
+  double rms_ns = 0.0;                           ///< of the offsets
+  double max_ns = 0.0;                           ///< the largest |offset|
+  double frequency_ppb = 0.0;                    ///< mean of the applied ones
   std::optional<double> frequency_spread_ppb{};  ///< their standard deviation
 };
 

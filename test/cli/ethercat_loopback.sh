@@ -18,6 +18,13 @@ grep -q "no reply from 127.0.0.1:$port" "$folder/nobody" || fail "nobody there: 
 "$ftcs" ethercat run --cycle 3x > "$folder/usage" 2>&1
 [ $? -eq 2 ] || fail "wrong duration: expected exit code 2"
 
+for number in "run --duration nan" "run --unlocked-limit nan" "run --bus-limit-ppm nan" "run --gains nan,1" "run --duration inf"; do
+  "$ftcs" ethercat $number > "$folder/number" 2>&1
+  [ $? -eq 2 ] || fail "$number: expected exit code 2"
+done
+"$ftcs" ethercat-segment --duration nan > "$folder/number" 2>&1
+[ $? -eq 2 ] || fail "segment --duration nan: expected exit code 2"
+
 "$ftcs" ethercat-segment --udp "$port" --drives 8 --priority 70 --json "$folder/segment.json" > "$folder/segment" 2>&1 &
 segment=$!
 pids+=("$segment")
@@ -64,9 +71,31 @@ head -n 20 "$folder/record/pipe" > "$folder/lines" &
 "$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" -q --csv "$folder/record/pipe" --json "$folder/cut.json" > "$folder/cut" 2>&1
 [ $? -eq 1 ] && grep -q "cannot write .*pipe: Broken pipe (the run went on without it)" "$folder/cut" || fail "CSV cut short"
 [ "$(wc -l < "$folder/lines")" -eq 20 ] && grep -q '"cycles": [1-9]' "$folder/cut.json" || fail "CSV cut short: no figures"
+# Neither a reader that goes away nor a full disk ends the drives.
+"$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" --json "$folder/head.json" 2> "$folder/head.log" | head -n 1 > "$folder/head"
+code=${PIPESTATUS[0]}
+[ "$code" -eq 0 ] || [ "$code" -eq 3 ] || fail "a reader that went away: exit code $code"
+grep -q "standard output: nobody reads it any more; the run goes on" "$folder/head.log" || fail "a reader that went away is not told of"
+python3 -c 'import json, sys; sys.exit(json.load(open(sys.argv[1]))["cycles"] < 400)' "$folder/head.json" || fail "a reader that went away: ended early"
+"$ftcs" ethercat-segment --udp $((port + 2)) --duration 60 --clock-csv "$folder/none/x" > "$folder/unwritable" 2>&1
+[ $? -eq 1 ] && grep -q "cannot write .*none/x: No such file" "$folder/unwritable" || fail "segment: record in a folder that is not there"
 if [ -w /dev/full ]; then
+  "$ftcs" ethercat-segment --udp $((port + 3)) --drives 2 --priority 0 --clock-csv /dev/full --json "$folder/full.json" > "$folder/full.out" 2>&1 &
+  full=$!
+  pids+=("$full")
+  sleep 0.3
+  "$ftcs" ethercat run --udp "127.0.0.1:$((port + 3))" --cycle 1ms --gate 1ms --priority 0 --drift-pulses 15000 --duration 2 -q \
+    --lost-frame-limit 1000 > "$folder/on_full" 2>&1
+  code=$?
+  [ $code -eq 0 ] || [ $code -eq 3 ] || fail "a segment whose disk is full: exit code $code"
+  kill -INT "$full"
+  wait "$full"
+  [ $? -eq 1 ] && grep -q "cannot write /dev/full: No space left on device; the segment goes on without it" "$folder/full.out" ||
+    fail "a segment whose disk is full does not say so"
+  grep -q '"sync0_events": [1-9]' "$folder/full.json" || fail "a segment whose disk is full ended"
   "$ftcs" ethercat run "${to[@]}" "${quick[@]}" "${short[@]}" > /dev/full 2> "$folder/full"
   [ $? -eq 1 ] && grep -q "cannot write" "$folder/full" || fail "standard output full"
+  grep -q "standard output: No space left on device; the run goes on" "$folder/full" || fail "standard output full is not told of at once"
 fi
 timeout -s INT 2 "$ftcs" ethercat run "${to[@]}" "${quick[@]}" --drift-pulses 1000000 > "$folder/early" 2>&1
 grep -q "stopped by a signal before the first cycle" "$folder/early" || fail "interrupted bring-up"

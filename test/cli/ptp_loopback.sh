@@ -32,14 +32,34 @@ ptp --servo none --offset 1ms "${receive[@]}" > "$folder/none" 2>&1 &
 none=$!
 for setting in ingressLatency egressLatency delayAsymmetry; do
   ptp --free_running 1 --json "--$setting" -400000 "${receive[@]}" > "$folder/$setting" 2> /dev/null &
-  pids+=($!)
+  corrections+=($!)
 done
+pids+=("${corrections[@]}")
 ptp > "$folder/interrupted" 2>&1 &
 interrupted=$!
-pids+=($json $csv $far $step $alone $none $interrupted)
+# Whoever goes away, such as head, ends no clock; nor does a full disk.
+ptp --json "${receive[@]}" 2> "$folder/reader.log" > >(head -n 2 > "$folder/reader") &
+reader=$!
+full=
+if [ -w /dev/full ]; then
+  ptp --csv "${receive[@]}" > /dev/full 2> "$folder/full.log" &
+  full=$!
+fi
+ptp "${receive[@]}" > >(head -n 2 > "$folder/text") 2> "$folder/text.log" &
+text=$!
+pids+=($reader $text $full $json $csv $far $step $alone $none $interrupted)
 
 wait $json || fail "--json: exit code $?, expected 0 (locked)"
 wait $csv || fail "--csv: exit code $?, expected 0 (locked)"
+wait $reader || fail "--json, whose reader went away: exit code $?, expected 0 (locked)"
+wait $text || fail "a log whose reader went away: exit code $?, expected 0 (locked)"
+[ "$(wc -l < "$folder/reader")" -eq 2 ] || fail "--json, whose reader went away: no lines"
+for log in reader text; do
+  [ "$(grep -c "standard output: nobody reads it any more" "$folder/$log.log")" -eq 1 ] || fail "$log: it is not said, once"
+done
+grep -q "summary: locked" "$folder/reader.log" || fail "--json, whose reader went away: no summary"
+[ -z "$full" ] || { wait $full && grep -q "standard output: No space left on device; samples are lost" "$folder/full.log"; } ||
+  fail "--csv to a full disk"
 wait $step || fail "--first-step: exit code $?, expected 0 (locked)"
 wait $far; [ $? -eq 3 ] || fail "2 s away without --first-step: expected exit code 3 (not locked)"
 grep -q "the offset is 2.000 s, more than 1 s: not followed, 1 in a row; .*(--offset, 37s if it shows TAI)" "$folder/far" || fail "no clear warning when 2 s away"
@@ -49,7 +69,7 @@ wait $none; [ $? -eq 3 ] || fail "1 ms away and free running: expected exit code
 grep -q "1 steps" "$folder/step" || fail "--first-step: no step"
 
 # Stamps of arrival 400 us too late, of departure too late, a way there 400 us shorter: what ptp4l makes of that.
-wait "${pids[@]:1:3}"
+wait "${corrections[@]}"
 python3 - "$folder" << 'EOF' || fail "corrections of latency and asymmetry"
 import json, statistics, sys
 for name, offset_us, delay_us in (("ingressLatency", 200, 200), ("egressLatency", -200, 200), ("delayAsymmetry", 400, 0)):

@@ -41,9 +41,9 @@ CASES = [
     case("no Delay_Resp", "raw", ["delay_resp=0"], [], "no_delay_resp", "do not reach the transmitter"),
     case("Delay_Resp to others", "raw", ["resp_to_others=1"], [], "delay_resp_for_others", "serves others alone"),
     case("two clocks with one identity", "raw", ["twins=1"], [], "two_transmitters", "clockIdentity"),
-    case("two transmitters disagree", "raw", ["priority1=100"], [], "transmitters_disagree", "--acceptable-transmitter",
+    case("two transmitters disagree", "raw", ["priority1=100"], ["--first-step"], "transmitters_disagree", "--acceptable-transmitter",
          second=["identity=0a0b0cfffe0102ff", "ahead=37.005"]),
-    case("an asymmetric path", "raw", ["priority1=100"], [], "transmitters_disagree", "asymmetric by twice as much",
+    case("an asymmetric path", "raw", ["priority1=100"], ["--first-step"], "transmitters_disagree", "asymmetric by twice as much",
          second=["identity=0a0b0cfffe0102ff", "forward_wait=0.01", "domain=1"]),
     case("alternate transmitters alone", "raw", ["alternate=1"], [], "alternate", "transmitter's own settings"),
     case("255 steps from the grandmaster", "raw", ["steps_removed=255"], [], "unusable_announce", "--clockIdentity"),
@@ -52,9 +52,14 @@ CASES = [
     case("a wrong UTC offset", "raw", ["utc_offset=0"], ["--clock", "system"], "timescale", "utc_offset 37"),
     case("UTC taken for TAI", "raw", ["ahead=0"], ["--clock", "system"], "timescale", "37 s ahead"),
     case("a reference in 1970", "raw", ["ahead=-1000000000"], ["--clock", "system"], "timescale", "--max-first-change"),
+    case("37 s away, and no step", "raw", [], [], "first_offset", "--offset 37s"),
+    case("the system clock is 5 s away, and no step", "raw", ["ahead=42"], ["--clock", "system"], "first_offset", "--first-step"),
     case("the link is down", None, [], [], "link_down", "ip link set", prepare="ip link set $INTERFACE down"),
     case("no such adapter clock", None, [], ["-H"], "other", "hardware"),
 ]
 # A receiver that nothing stands in the way of is locked: else the table above would show nothing.
-GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], [], "locked", ""),
+GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], ["--first-step"], "locked", ""),
+        case("37 s away, where a virtual clock may begin", "raw", [], ["--offset", "37s"], "locked", ""),
+        case("TAI for the system clock", "raw", [], ["--clock", "system"], "locked", ""),
+        case("the system clock is 5 s away, and a step allowed", "raw", ["ahead=42"], ["--clock", "system", "--first-step"], "locked", ""),
         case("two transmitters agree", "ptp4l", [], [], "locked", "", second=["domainNumber 1", "clockIdentity 0a0b0c.fffe.0102ff"])]

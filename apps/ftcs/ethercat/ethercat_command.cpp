@@ -10,6 +10,7 @@
 
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/config_file.h"
+#include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/rights.h"
@@ -187,7 +188,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   if (auto wrong = open_keys(options.ptp)) return "--ptp-config: " + *wrong;
   if (auto wrong = check_drive_sync(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
-  if (arguments.gains.size() != 2 || arguments.gains[0] < 0.0 || arguments.gains[1] < 0.0) {
+  if (arguments.gains.size() != 2 || !(arguments.gains[0] >= 0.0 && arguments.gains[1] >= 0.0)) {
     return "--gains: two numbers, as in 1,1";
   }
   servo.proportional_gain = arguments.gains[0];
@@ -239,14 +240,14 @@ void add_servo_flags(CLI::App& command, EthercatArguments& arguments) {
   add_time(command, "--sync-interval", arguments.sync_interval, 1,
            "ftcs and pics act once in this time; default 500ms");
   command.add_option("--offset-gain", servo.offset_gain, "ftcs: p inside the band")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_from(0.0, 1.0));
   add_time(command, "--converged-band", arguments.band, 0, "ftcs: B; default 5us");
   command.add_option("--gains", arguments.gains, "pics: k_p,k_i times the cycles per interval")
       ->delimiter(',');
   add_time(command, "--shift", servo.shift, 0, "frames leave so long after whole cycles");
   command
       .add_option("--sync0-phase", options.sync0_phase, "SYNC0 after the frame, part of a cycle")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_from(0.0, 1.0));
   add_time(command, "--timer-resolution", servo.resolution, 1, "10us is the paper's timer");
   add_time(command, "--transit", servo.transit, 0, "from the transmit stamp to the reference");
   add_time(command, "--gate", arguments.gate, 0, "largest lateness and round trip; default 200us");
@@ -271,7 +272,7 @@ void add_drive_flags(CLI::App& command, daemon::RunOptions& options) {
   command
       .add_option("--unlocked-limit", options.unlocked_limit_s,
                   "seconds without the lock, once it was there, that stop the drives; default 10")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(number_from(0.1, 1e6));
   add_choice(command, "--lock-policy", options.lock_policy,
              {{"advisory", node::LockPolicy::kAdvisory},
               {"recovering", node::LockPolicy::kRecovering},
@@ -281,7 +282,7 @@ void add_drive_flags(CLI::App& command, daemon::RunOptions& options) {
   command
       .add_option("--await-lock", options.await_lock_s,
                   "seconds that the drives wait in SAFEOP for the first lock; default 0, for ever")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_from(0.0, 1e6));
   command
       .add_option(
           "--reset-faults", options.fault_resets,
@@ -290,7 +291,7 @@ void add_drive_flags(CLI::App& command, daemon::RunOptions& options) {
   command
       .add_option("--ride-through", options.ride_through_s,
                   "seconds in which drives may be out of reach before the rest is stopped")
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_from(0.0, 1e6));
   command.add_flag("!--no-motion", options.move, "leave the axes disabled");
 }
 
@@ -326,7 +327,7 @@ void add_plant_time_flags(CLI::App& command, daemon::RunOptions& options) {
   command
       .add_option("--start-at", options.start_s,
                   "the circles begin at this second of plant time (since 2000-01-01)")
-      ->check(CLI::Range(0.0, 1e11));
+      ->check(number_from(0.0, 1e11));
 }
 
 void add_bus_flags(CLI::App& command, daemon::RunOptions& options) {
@@ -346,11 +347,11 @@ void add_bus_flags(CLI::App& command, daemon::RunOptions& options) {
   command
       .add_option("--bus-limit-ppm", options.bus_limit_ppm,
                   "largest rate of the drives' clock against its crystal; default 400")
-      ->check(CLI::Range(1.0, 1000.0));
+      ->check(number_from(1.0, 1000.0));
   command
       .add_option("--bus-slope-ppm-s", options.bus_slope_ppm_s,
                   "largest change of that rate in a second; default 100")
-      ->check(CLI::Range(0.001, 10'000.0));
+      ->check(number_from(0.001, 10'000.0));
 }
 
 void add_run_flags(CLI::App& command, daemon::RunOptions& options) {
@@ -360,7 +361,8 @@ void add_run_flags(CLI::App& command, daemon::RunOptions& options) {
   command.add_option("--priority", options.priority, "SCHED_FIFO, 0 for none; default 80")
       ->check(CLI::Range(0, 99));
   command.add_option("--cpu", options.cpu, "pin to this processor");
-  command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever");
+  command.add_option("--duration", options.duration_s, "seconds of cycles; default 10, 0 for ever")
+      ->check(number_from(0.0, 1e9));
   command.add_option("--uds_address", options.status_socket,
                      "where ftcs status asks; default /var/run/ftcs-ethercat or "
                      "$XDG_RUNTIME_DIR/ftcs-ethercat");

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "apps/ftcs/commands.h"
+#include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/rights.h"
 #include "apps/ftcs/units.h"
@@ -108,7 +109,7 @@ int run_segment(SegmentArguments arguments) {
     return kUsageError;
   }
   const daemon::SegmentOptions& options = arguments.options;
-  if (!can_write_results({options.json})) return kRuntimeError;
+  if (!can_write_results({options.json, options.clock_csv})) return kRuntimeError;
   platform::LinuxKernel kernel;
   auto link = options.interface.empty()
                   ? platform::EthercatLink::listen_udp(kernel, options.address, options.port)
@@ -133,9 +134,10 @@ int run_segment(SegmentArguments arguments) {
   std::fflush(stdout);
   const platform::StopFlag stop;
   server.run([&stop] { return stop.is_set(); });
+  const bool recorded = server.finish_records();
+  const bool written = options.json.empty() || write_result(options.json, server.json());
   server.print_summary();
-  if (options.json.empty()) return kSuccess;
-  return write_result(options.json, server.json()) ? kSuccess : kRuntimeError;
+  return recorded && written ? kSuccess : kRuntimeError;
 }
 
 }  // namespace
@@ -151,15 +153,18 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
       ->excludes(interface);
   command->add_option("--drives", options.drives, "how many")->check(CLI::Range(1, 64));
   command->add_option("--ppm", options.ppm, "crystal of each drive; the last two take turns")
-      ->delimiter(',');
-  command->add_option("--random-walk-ppb", options.random_walk_ppb,
-                      "random walk of the crystals, ppb per square root of a second");
+      ->delimiter(',')
+      ->check(number_from(-1e5, 1e5));
+  command
+      ->add_option("--random-walk-ppb", options.random_walk_ppb,
+                   "random walk of the crystals, ppb per square root of a second")
+      ->check(number_from(0.0, 1e6));
   command->add_option("--topology", arguments->topology, "line (default) or tree")
       ->check(CLI::IsMember({"line", "tree"}));
   command->add_option("--cable", arguments->cable, "delay of each cable; default 50ns");
   command->add_option("--hop", arguments->hop, "delay in each SubDevice; default 300ns");
   command->add_option("--drop", options.drop, "share of frames to lose")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_from(0.0, 1.0));
   command->add_option("--fault", arguments->faults,
                       "cut:N@S, mend:N@S, restart:N@S or skew:N@S=PPM; may be repeated");
   command->add_flag("!--sign-bit-behind", options.sign_bit_means_ahead,
@@ -171,7 +176,8 @@ void add_ethercat_segment_command(CLI::App& app, int& exit_code) {
   command->add_option("--bridge", options.bridge,
                       "this SubDevice is a bridge terminal; its other side shows CLOCK_REALTIME");
   command->add_option("--seed", options.seed, "of crystals and losses");
-  command->add_option("--duration", options.duration_s, "stop after so many seconds");
+  command->add_option("--duration", options.duration_s, "stop after so many seconds; 0: never")
+      ->check(number_from(0.0, 1e9));
   command->add_option("--priority", arguments->priority, "SCHED_FIFO priority")
       ->check(CLI::Range(0, 99));
   command->add_option("--cpu", arguments->cpu, "pin to this processor");

@@ -90,7 +90,7 @@ void write_clock(Exposition& out, const WatchState& state) {
         1.0}});
   out.gauge("ftcs_uptime_seconds", "Since the start of the program", state.uptime_s);
   out.gauge("ftcs_offset_seconds", "Of the clock from its reference, as perceived",
-            state.offset_ns * 1e-9);
+            measured_offset_ns(state) * 1e-9);
   out.gauge("ftcs_offset_sigma_seconds",
             "Standard deviation of that offset, as the servo states it", state.sigma_ns * 1e-9);
   out.gauge("ftcs_offset_bound_seconds",
@@ -137,10 +137,9 @@ void write_tdev(Exposition& out, const std::vector<StabilityPoint>& tdev) {
              samples);
 }
 
-void write_cycle(Exposition& out, const WatchedCycle& cycle) {
+void write_cycle(Exposition& out, const WatchedCycle& cycle, double phase_ns) {
   if (!cycle.present) return;
-  out.gauge("ftcs_cycle_phase_seconds", "Of the cycle from the distributed clock",
-            cycle.phase_ns * 1e-9);
+  out.gauge("ftcs_cycle_phase_seconds", "Of the cycle from the distributed clock", phase_ns * 1e-9);
   out.gauge("ftcs_cycle_margin_seconds", "From the arrival of the frame to SYNC0, median",
             cycle.margin_ns * 1e-9);
   out.gauge("ftcs_cycle_wkc", "Of the last cycle", cycle.working_counter);
@@ -162,6 +161,7 @@ void write_cycle(Exposition& out, const WatchedCycle& cycle) {
         {label("drive", std::to_string(i)), static_cast<double>(cycle.drive[i].margin_us) * 1e-6});
   }
   out.gauges("ftcs_drives", "Drives in each state", states);
+  out.gauge("ftcs_axes_in_fault", "Axes in the state Fault of CiA 402", cycle.axes_in_fault);
   out.gauges("ftcs_drive_margin_seconds", "From the arrival of the frame at the drive to its SYNC0",
              margins);
 }
@@ -176,7 +176,7 @@ std::string openshift(const MetricsInput& input, MetricsFormat format) {
   const double clock = state.mode == WatchMode::kLocked     ? 1.0
                        : state.mode == WatchMode::kHoldover ? 2.0
                                                             : 0.0;
-  out.plain("openshift_ptp_offset_ns", "Offset, ns", labels, state.offset_ns);
+  out.plain("openshift_ptp_offset_ns", "Offset, ns", labels, measured_offset_ns(state));
   out.plain("openshift_ptp_max_offset_ns", "Largest offset of the last minutes, ns", labels,
             input.largest_offset_ns);
   out.plain("openshift_ptp_delay_ns", "Path delay, ns", labels, state.delay_ns);
@@ -195,7 +195,9 @@ std::string metrics_text(const MetricsInput& input, MetricsNames names, MetricsF
   write_clock(out, input.state);
   write_tdev(out, input.tdev);
   if (input.state.messages.present) write_messages(out, input.state.messages);
-  write_cycle(out, input.state.cycle);
+  write_cycle(
+      out, input.state.cycle,
+      input.state.mode == WatchMode::kHoldover ? WatchState::kUnknown : input.state.cycle.phase_ns);
   return out.take();
 }
 

@@ -77,15 +77,29 @@ TEST(Metrics, what_is_not_known_is_left_out) {
   expect_line(said, "ftcs_state{clock=\"ptp:eth0\",state=\"freerun\"} 1");
 }
 
+TEST(Metrics, in_holdover_the_bound_grows_and_no_offset_is_told) {
+  WatchState state = locked();
+  state.mode = WatchMode::kHoldover;
+  state.sigma_ns = 20.0;
+  for (const auto names : {MetricsNames::kFtcs, MetricsNames::kOpenShift}) {
+    EXPECT_EQ(text(state, names).find("offset_seconds{"), std::string::npos);
+    EXPECT_EQ(text(state, names).find("ptp_offset_ns{"), std::string::npos);
+  }
+  expect_line(text(state), "ftcs_offset_bound_seconds{clock=\"ptp:eth0\"} 1.1100000000000002e-06");
+  expect_line(text(state), "ftcs_state{clock=\"ptp:eth0\",state=\"holdover\"} 1");
+}
+
 TEST(Metrics, drives_are_counted_by_state) {
   WatchState state = locked();
   state.cycle.present = true;
+  state.cycle.axes_in_fault = 1;
   state.cycle.drives = 3;
   state.cycle.drive[0] = state.cycle.drive[1] = {8, 400.0F};
   state.cycle.drive[2] = {0x14, 399.0F};  // SAFEOP with an error
   const std::string said = text(state);
   expect_line(said, "ftcs_drives{clock=\"ptp:eth0\",state=\"op\"} 2");
   expect_line(said, "ftcs_drives{clock=\"ptp:eth0\",state=\"safeop\"} 1");
+  expect_line(said, "ftcs_axes_in_fault{clock=\"ptp:eth0\"} 1");
 }
 
 TEST(Metrics, openshift_calls_holdover_two) {

@@ -11,6 +11,10 @@ std::string_view name(WatchMode mode) noexcept {
   return kNames[static_cast<std::size_t>(mode)];
 }
 
+double measured_offset_ns(const WatchState& state) noexcept {
+  return state.mode == WatchMode::kHoldover ? WatchState::kUnknown : state.offset_ns;
+}
+
 double offset_bound_ns(const WatchState& state) noexcept {
   constexpr double kSigmas = 3.0;
   const double delay = std::isnan(state.delay_ns) ? 0.0 : std::abs(state.delay_ns);

@@ -56,6 +56,7 @@ struct WatchedCycle {
   double margin_ns = 0.0;
   std::uint16_t working_counter = 0;
   std::uint16_t expected_counter = 0;
+  std::uint16_t axes_in_fault = 0;
   std::uint64_t lost = 0;
   std::uint64_t late = 0;
   std::uint16_t drives = 0;
@@ -99,6 +100,8 @@ struct WatchState {
 };
 static_assert(std::is_trivially_copyable_v<WatchState> && std::is_trivially_copyable_v<WatchPoint>);
 
+/// The offset while it is measured; in holdover nobody measures it, and only the bound is known.
+[[nodiscard]] double measured_offset_ns(const WatchState& state) noexcept;
 /// An offset of so much cannot be exceeded while the reference is right: |offset| + 3 sigma + the
 /// path delay, as no asymmetry of the path is larger.
 [[nodiscard]] double offset_bound_ns(const WatchState& state) noexcept;
