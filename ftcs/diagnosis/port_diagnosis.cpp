@@ -9,8 +9,9 @@ namespace ftcs::diagnosis {
 namespace {
 
 std::string figures(const PortSeen& seen) {
-  return fmt::format("offset {:.0f} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
-                     seen.servo.offset.ns(), seen.servo.path_delay.ns(), seen.rate.ppb());
+  // Whole numbers, as there is no -0 among them.
+  return fmt::format("offset {} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
+                     seen.servo.offset.rounded_ns(), seen.servo.path_delay.ns(), seen.rate.ppb());
 }
 
 Finding acquiring(const PortSeen& seen) {

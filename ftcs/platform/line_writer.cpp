@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -10,7 +11,6 @@
 #include <utility>
 
 #include <climits>
-#include <cstring>
 
 namespace ftcs::platform {
 namespace {

@@ -57,7 +57,9 @@ class Browser:
         raise AssertionError(f"not within {seconds} s: {script}; last: {value}")
 
     def console(self):
-        return [entry["message"] for entry in self.post("/se/log", {"type": "browser"})]
+        """What pages said, less the browser's own (chrome://), which a slow machine makes talk."""
+        messages = [entry["message"] for entry in self.post("/se/log", {"type": "browser"})]
+        return [message for message in messages if not message.startswith("chrome://")]
 
     def emulate(self, **features):
         """prefers-color-scheme and the size of the screen, by the browser's own protocol."""

@@ -15,6 +15,7 @@ function nanoseconds(value) {
   if (size >= 1e9) return (value / 1e9).toPrecision(4) + " s";
   if (size >= 1e6) return (value / 1e6).toPrecision(4) + " ms";
   if (size >= 1e3) return (value / 1e3).toPrecision(4) + " µs";
+  if (size < 0.005) return "0.00 ns";  // and not -0.00
   return value.toFixed(size < 10 ? 2 : 1) + " ns";
 }
 function duration(seconds) {
