@@ -150,8 +150,8 @@ std::optional<diagnosis::Finding> disagreement(const ptp::PortIdentity& one, con
       true};
 }
 
-diagnosis::Finding failure(std::string text) {
-  return {diagnosis::Cause::kOther, std::move(text), "", ""};
+diagnosis::Finding failure(std::string text, std::string remedy = {}) {
+  return {diagnosis::Cause::kOther, std::move(text), "", std::move(remedy)};
 }
 
 bool is_link_up(platform::Kernel& kernel, const std::string& interface) {
@@ -192,6 +192,33 @@ std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
   PtpReceiver second(kernel, of_other, log, std::move(clocks->timestamps), facts, nullptr);
   (void)second.run();
   return disagreement(*followed, first.time(), *other, second.time());
+}
+
+bool has_adapter_stamps(platform::Kernel& kernel, const PtpOptions& options) {
+  const auto adapter = platform::interface_capabilities(kernel, options.interface);
+  return adapter && adapter->hardware_timestamps;
+}
+
+/// Switching the adapter's stamps on, or to another filter, may take them from a program that runs.
+/// An adapter without any is left to say so.
+PtpOptions trial(platform::Kernel& kernel, const PtpOptions& given, bool adapter_stamps) {
+  PtpOptions options = quiet(given);
+  const bool ethernet = options.socket.transport == platform::NetworkTransport::kEthernet;
+  if (adapter_stamps &&
+      !platform::has_hardware_timestamps_on(kernel, options.interface, ethernet)) {
+    options.timestamps = platform::TimestampMode::kSoftware;
+  }
+  return options;
+}
+
+/// The hardware clock that is to be steered is not there.
+std::optional<diagnosis::Finding> missing_clock(platform::Kernel& kernel, const PtpOptions& given,
+                                                bool phc) {
+  if (!phc) return std::nullopt;
+  const auto device =
+      platform::ClockDevice::open_phc_of(kernel, given.interface, platform::ClockAccess::kRead);
+  if (device) return std::nullopt;
+  return failure(device.error().message(), "--clock system steers the system clock instead");
 }
 
 /// How far the real clock that would be steered is from the reference, if that is farther than is
@@ -235,17 +262,16 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
 Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   const bool steers = given.clock != ClockKind::kVirtual;
   const bool any_epoch = given.epoch.any_epoch;
-  const bool system = given.clock == ClockKind::kSystem;
-  PtpOptions options = quiet(given);
-  // Switching the adapter's stamps on, or to another filter, may take them from a program that
-  // runs. An adapter without any is left to say so.
-  const auto adapter = platform::interface_capabilities(kernel, options.interface);
-  const bool ethernet = options.socket.transport == platform::NetworkTransport::kEthernet;
-  if (adapter && adapter->hardware_timestamps &&
-      !platform::has_hardware_timestamps_on(kernel, options.interface, ethernet)) {
-    options.timestamps = platform::TimestampMode::kSoftware;
-  }
+  const bool adapter_stamps = has_adapter_stamps(kernel, given);
+  const PtpOptions options = trial(kernel, given, adapter_stamps);
   Examination result;
+  // The hardware clock is looked at even where a trial without its stamps has to do.
+  const bool phc =
+      given.clock == ClockKind::kPhc || (given.clock == ClockKind::kAuto && adapter_stamps);
+  if (auto missing = missing_clock(kernel, given, phc)) {
+    result.findings.push_back(std::move(*missing));
+    return result;
+  }
   Log log(kernel, stdout, options.log_level);
   auto clocks = open_ptp_clocks(kernel, options, log);
   if (!clocks) {
@@ -260,12 +286,11 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   PortFacts facts{{identity->clock, kPortOfItsOwn}};
   facts.hardware_stamps = clocks->timestamps->is_hardware();
   std::optional<ClockWatch> clock;
-  if (steers) clock.emplace(kernel, options, facts.hardware_stamps && !system);
+  if (steers) clock.emplace(kernel, options, phc);
   WireWatch wire(options.interface, identity->clock);
   PtpReceiver port(kernel, options, log, std::move(clocks->timestamps), facts, nullptr);
   (void)port.run();
-  const auto far =
-      steers ? first_offset(kernel, given, facts.hardware_stamps && !system, port) : std::nullopt;
+  const auto far = steers ? first_offset(kernel, given, phc, port) : std::nullopt;
   diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr, options);
   seen.steers_real_clock = steers && !any_epoch;
   seen.first_offset = far;

@@ -2,10 +2,12 @@
 #include "ftcs/experiment/toml_table.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -277,6 +279,10 @@ toml::table parse_toml_text(std::string_view text, const std::string& name) {
 
 std::string read_text_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw ScenarioError(
+        fmt::format("{}: cannot be read: {}", path, std::generic_category().message(errno)));
+  }
   std::ostringstream content;
   if (file && file.peek() != std::ifstream::traits_type::eof()) content << file.rdbuf();
   if (!file && !file.eof()) throw ScenarioError(fmt::format("{}: cannot be read", path));

@@ -56,6 +56,7 @@ CASES = [
     case("the system clock is 5 s away, and no step", "raw", ["ahead=42"], ["--clock", "system"], "first_offset", "--first-step"),
     case("the link is down", None, [], [], "link_down", "ip link set", prepare="ip link set $INTERFACE down"),
     case("no such adapter clock", None, [], ["-H"], "other", "hardware"),
+    case("a clock that the adapter does not have", "raw", [], ["--clock", "phc"], "other", "--clock system"),
 ]
 # A receiver that nothing stands in the way of is locked: else the table above would show nothing.
 GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], ["--first-step"], "locked", ""),
