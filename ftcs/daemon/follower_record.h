@@ -66,8 +66,7 @@ class FollowerRecord {
   [[nodiscard]] Status status(FreeRunningTime now) const;
 
  private:
-  void add_sync(const node::Steered& steered, double time_s,
-                std::optional<Duration> sync_interval);
+  void add_sync(const node::Steered& steered, double time_s, std::optional<Duration> sync_interval);
   void report(const SampleRecord& record, std::optional<Duration> sync_interval);
   [[nodiscard]] bool has_room_for_line(double time_s);
   void report_text(const SampleRecord& record, std::optional<Duration> sync_interval);
