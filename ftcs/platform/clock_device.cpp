@@ -221,6 +221,17 @@ Result<Rate, ClockError> ClockDevice::rate() noexcept {
   return Frequency{is_system() ? request.tick : kNominalTick, request.freq}.rate();
 }
 
+// A driver that is busy mostly takes the next command.
+int ClockDevice::change(const timex& wanted) noexcept {
+  constexpr int kAttempts = 5;
+  int result = -EBUSY;
+  for (int i = 0; i < kAttempts && (result == -EBUSY || result == -EAGAIN); ++i) {
+    timex request = wanted;
+    result = kernel_->adjust_clock(id_, request);
+  }
+  return result;
+}
+
 Result<Rate, ClockError> ClockDevice::set_rate(Rate rate) noexcept {
   if (!limits_.contains(rate)) return ClockError::kRateOutOfLimits;
   Frequency wanted;
@@ -234,7 +245,7 @@ Result<Rate, ClockError> ClockDevice::set_rate(Rate rate) noexcept {
     wanted.freq = static_cast<long>(rate.ppm() * kScaledPerPpm);  // towards zero: within the limits
   }
   request.freq = wanted.freq;
-  if (const auto error = failed(kernel_->adjust_clock(id_, request))) return *error;
+  if (const auto error = failed(change(request))) return *error;
   return wanted.rate();
 }
 
@@ -248,7 +259,7 @@ std::optional<ClockError> ClockDevice::step(Duration by) noexcept {
     request.time.tv_usec += kNsPerSecond;
     --request.time.tv_sec;
   }
-  return failed(kernel_->adjust_clock(id_, request));
+  return failed(change(request));
 }
 
 }  // namespace ftcs::platform

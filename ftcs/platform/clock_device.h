@@ -80,6 +80,7 @@ class ClockDevice {
   [[nodiscard]] std::optional<ClockError> failed(int result) noexcept;
   [[nodiscard]] std::optional<Reading> read_once() noexcept;
   [[nodiscard]] ClockError why_unread() noexcept;
+  [[nodiscard]] int change(const timex& wanted) noexcept;
 
   Kernel* kernel_;
   std::string name_;
