@@ -128,6 +128,8 @@ static int adjfine(struct ptp_clock_info *info, long scaled_ppm)
 	 */
 	s64 adj = (s64)(((__int128)scaled_ppm * 18446744073710LL) >> 32);
 
+	if (vptp_chance(c->busy_permille))
+		return -EBUSY;
 	if (c->granularity_ppt) {
 		s64 unit = from_ppt(c->granularity_ppt);
 		s64 half = adj < 0 ? -unit / 2 : unit / 2;
@@ -142,6 +144,8 @@ static int adjtime(struct ptp_clock_info *info, s64 delta)
 {
 	struct vptp_clock *c = container_of(info, struct vptp_clock, info);
 
+	if (vptp_chance(c->busy_permille))
+		return -EBUSY;
 	c->adjtimes++;
 	vptp_clock_jump(c, delta);
 	return 0;
@@ -181,10 +185,12 @@ static int gettimex(struct ptp_clock_info *info, struct timespec64 *ts,
 
 	if (c->unreadable)
 		return -EIO;
+	if (vptp_chance(c->busy_permille))
+		return -EBUSY;
 	ptp_read_system_prets(sts);
 	interrupted(c, true, dice);
 	ndelay(c->read_ns);
-	raw = ktime_get_raw_ns();
+	raw = ktime_get_raw_ns() + c->read_skew_ns;
 	ndelay(c->read_ns);
 	interrupted(c, false, dice);
 	ptp_read_system_postts(sts);
@@ -218,6 +224,8 @@ static int getcrosststamp(struct ptp_clock_info *info,
 
 	if (c->unreadable)
 		return -EIO;
+	if (vptp_chance(c->busy_permille))
+		return -EBUSY;
 	return get_device_system_crosststamp(read_with_counter, c, NULL,
 					     stamps);
 }

@@ -70,9 +70,11 @@ static void create_clock(struct dentry *dir, struct vptp_clock *c)
 	debugfs_create_u32("wander_ppt", 0644, dir, &c->wander_ppt);
 	debugfs_create_u32("granularity_ppt", 0644, dir, &c->granularity_ppt);
 	debugfs_create_u32("read_ns", 0644, dir, &c->read_ns);
+	debugfs_create_u32("read_skew_ns", 0644, dir, &c->read_skew_ns);
 	debugfs_create_u32("wide_permille", 0644, dir, &c->wide_permille);
 	debugfs_create_u32("wide_us", 0644, dir, &c->wide_us);
 	debugfs_create_u32("unreadable", 0644, dir, &c->unreadable);
+	debugfs_create_u32("busy_permille", 0644, dir, &c->busy_permille);
 }
 
 static void create_port(struct dentry *dir, struct vptp_port *p)

@@ -51,9 +51,11 @@ struct vptp_clock {
 	u32 wander_ppt; /* standard deviation of a step every 100 ms */
 	u32 granularity_ppt; /* the adjustment is a multiple of it; 0: any */
 	u32 read_ns; /* a reading takes so long before, and after */
+	u32 read_skew_ns; /* the instant of a reading is so much later */
 	u32 wide_permille; /* of readings: interrupted, on either side */
 	u32 wide_us; /* for so long */
 	u32 unreadable; /* readings fail with -EIO */
+	u32 busy_permille; /* of readings and settings: fail with -EBUSY */
 
 	/* pins.c: one output, wired to the input of the pair's other clock */
 	struct hrtimer timer;
