@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Length: the order of the steps is the algorithm, and each reads the same
-// small state.
 #include "ftcs/estimation/estimator.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <new>
-
-#include "ftcs/measurement/order_statistic.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -50,40 +46,6 @@ constexpr double kSettledContradiction = 20.0;
 /// Rejections in a row of one direction, or innovations that hardly differ,
 /// after which it is asked every time for a while.
 constexpr int kSurprises = 3;
-
-std::size_t index_of(Direction direction) noexcept {
-  return direction == Direction::kForward ? 0 : 1;
-}
-/// Six messages: short enough for the three or four that follow a change, long
-/// enough not to follow the noise. Its usual fluctuation stays below 1.6.
-constexpr double kSurpriseShare = 1.0 / 6.0;
-constexpr double kUsualSurprise = 1.6;
-constexpr double kSurpriseLimit = 100.0;
-/// Variances of both directions that differ by less are of one kind of load.
-constexpr double kAlike = 4.0;
-/// The sharpest shape tried has a normal part of a seventh of the tail. Where
-/// that is the best shape the true edge is anything between that soft and as
-/// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
-/// late (measured). Taken back is the middle; what is open is as much.
-constexpr double kEdgeBias = 0.027;
-constexpr double kFloorDoubt = 0.03;
-constexpr double kSharpest = 0.97;
-
-double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
-
-/// Noise of one kind: what it is, a queue or outliers, is decided for both
-/// directions at once. One that alone took its noise for a queue would move the
-/// offset by half a tail.
-bool alike(double variance, double other) noexcept {
-  return std::max(variance, other) < kAlike * std::min(variance, other);
-}
-
-/// Geometric mean of the standard deviations of one or both directions, of the
-/// product of their variances.
-double common_deviation(double variances, int sides) noexcept {
-  const double root = std::sqrt(variances);
-  return sides == 2 ? std::sqrt(root) : root;
-}
 
 }  // namespace
 
@@ -136,7 +98,8 @@ template <class Grid>
 void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
-  if (pinned_) unpin_delay(-sign_of(side), kDelayPrior);
+  const double first_sign = side == 0 ? -1.0 : 1.0;  // of the other direction
+  if (pinned_) unpin_delay(first_sign, kDelayPrior);
 }
 
 template <class Grid>
@@ -222,25 +185,42 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     // message as an outlier would otherwise gather no squares and look perfect.
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
-  if (count_ > kJudgeFrom) {
-    gate_.learn(side, credit);
-    lateness_.observe(side, innovations.centred[best_] > 0.0, innovations.distance[best_]);
-    using Message = EarlyMessages::Message;
-    const bool early = innovations.centred[best_] < 0.0;
-    const bool far = innovations.distance[best_] > kFarOff;
-    const Message message = far ? (early ? Message::kEarly : Message::kLate)
-                                : (credit >= 0.5 ? Message::kFits : Message::kNeither);
-    const bool contradicted = early_.contradicted_by(direction_of(seen), early);
-    const bool seconded = early_.seconded_by(direction_of(seen), early);
-    if (early_.observe(direction_of(seen), message)) detector_.clear();
-    const bool clock = (!two_way() || lateness_.speaks_of_clock()) && !contradicted;
-    const bool suffices = early_.one_suffices() || count_ <= kOpinionOften;
-    detect_changes(innovations.log_density, {clock, suffices, seconded});
-  }
+  if (count_ > kJudgeFrom) heed(seen, innovations);
   if (follow_gate(side, credit, innovation)) {
     if (count_ == 0 || diverged_) return 0.0;
     hear_again(seen, outliers);
   }
+  learn_noise(side, innovation, innovations);
+  if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
+  seek_second_opinion(seen, innovation);
+  choose();
+  mix();
+  return credit;
+}
+
+/// What one message says of outliers, and of a sudden change.
+template <class Grid>
+void Estimator<Grid>::heed(const Observation& seen, const Innovations& innovations) noexcept {
+  const std::size_t side = seen.sign > 0.0 ? 0 : 1;
+  const double credit = innovations.credit[best_];
+  gate_.learn(side, credit);
+  lateness_.observe(side, innovations.centred[best_] > 0.0, innovations.distance[best_]);
+  using Message = EarlyMessages::Message;
+  const bool early = innovations.centred[best_] < 0.0;
+  const bool far = innovations.distance[best_] > kFarOff;
+  const Message message = far ? (early ? Message::kEarly : Message::kLate)
+                              : (credit >= 0.5 ? Message::kFits : Message::kNeither);
+  const bool contradicted = early_.contradicted_by(direction_of(seen), early);
+  const bool seconded = early_.seconded_by(direction_of(seen), early);
+  if (early_.observe(direction_of(seen), message)) detector_.clear();
+  const bool clock = (!two_way() || lateness_.speaks_of_clock()) && !contradicted;
+  const bool suffices = early_.one_suffices() || count_ <= kOpinionOften;
+  detect_changes(innovations.log_density, {clock, suffices, seconded});
+}
+
+template <class Grid>
+void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
+                                  const Innovations& innovations) noexcept {
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
     const double size = std::sqrt(innovations.distance[best_]);
@@ -249,7 +229,8 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     follow_scale();
   }
   if (count_ > kLearnFrom) {
-    const NoiseSample sample{innovation, predicted, robust_scale_, since_change_ > 8};
+    const NoiseSample sample{innovation, innovations.predicted[best_], robust_scale_,
+                             since_change_ > 8};
     if (learner_[side].learn(sample, shape_[side])) {
       const auto taken = static_cast<std::uint32_t>(learner_[side].count());
       const std::size_t other = 1 - side;
@@ -258,11 +239,6 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
       if (all_mature && taken % 16 == 0) adopt_shapes();
     }
   }
-  if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
-  seek_second_opinion(seen, innovation);
-  choose();
-  mix();
-  return credit;
 }
 
 /// Not inlined: its innovations would lie on the stack of every message.
@@ -386,163 +362,9 @@ void Estimator<Grid>::choose() noexcept {
   weight_[best_] = 1.0;
 }
 
-/// ns by which the filters put the floor of a direction too late.
-template <class Grid>
-double Estimator<Grid>::edge_bias_ns(std::size_t side) const noexcept {
-  const DelayShape& shape = shape_[side];
-  const bool sharp = shape.tail * shape.tail > kSharpest * shape.total_variance();
-  return sharp ? kEdgeBias * shape.tail * scale_ : 0.0;
-}
-
-template <class Grid>
-void Estimator<Grid>::mix() noexcept {
-  mixed_ = bank_.mixture(weight_, scale_);
-  const double ahead = edge_bias_ns(0);
-  const double back = edge_bias_ns(1);
-  if (delay_free()) {
-    mixed_.x -= (ahead - back) / 2.0;
-    mixed_.d -= (ahead + back) / 2.0;
-  } else {
-    mixed_.x -= ahead - back;
-  }
-  process_ = bank_.mean_noise(weight_);
-}
-
-template <class Grid>
-void Estimator<Grid>::follow_scale() noexcept {
-  if (residuals_.size() > 0) {
-    robust_scale_ = std::max(least_noise_, kMadToSigma * residuals_.median());
-  }
-  if (evidence_.messages() > 4.0 &&
-      evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
-    // Old gross errors are all that the evidence tells. The model that has
-    // coped is right by now; without evidence any other might be chosen.
-    evidence_.forget();
-    const Estimate coped = bank_.estimate(best_);
-    bank_.for_each([&coped](Estimate& e) { e = coped; });
-  }
-  // Fourth root of both directions' variances: the scale is their geometric
-  // mean.
-  double learnt = 1.0;
-  double assumed = 1.0;
-  int sides = 0;
-  bool mature = true;
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (!seen_[side]) continue;
-    ++sides;
-    mature = mature && learner_[side].mature();
-    learnt *= learner_[side].variance();
-    assumed *= shape_[side].total_variance();
-  }
-  scale_ = robust_scale_;
-  if (!mature) return;
-  const double wanted = common_deviation(learnt / assumed, sides);
-  // What is learnt may be below what rounding makes: stamps that agree to the digit for seconds.
-  scale_ = std::max(least_noise_, std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_));
-}
-
-/// Brings the learnt shapes into use. When a tail appears or goes, the zero of
-/// the delay moves from the mean to the floor or back by `shift`; half of it
-/// was offset, half path delay, known to about 30 per cent.
-template <class Grid>
-void Estimator<Grid>::adopt_shapes() noexcept {
-  double product = 1.0;
-  int sides = 0;
-  std::array<DelayShape, 2> in_ns{};
-  std::array<typename NoiseLearner<Grid::kNoiseWindow>::Case, 2> said{learner_[0].plead(),
-                                                                      learner_[1].plead()};
-  if (two_way() && alike(learner_[0].variance(), learner_[1].variance())) {
-    said[0].add(said[1]);
-    said[1] = said[0];
-  }
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (!seen_[side]) continue;
-    ++sides;
-    const double old_tail = scale_ * shape_[side].tail;
-    in_ns[side] = learner_[side].decide(said[side]);
-    in_ns[side].variance = std::max(in_ns[side].variance, least_noise_ * least_noise_);
-    product *= in_ns[side].total_variance();
-    const bool switched = (old_tail > 0.0) != (in_ns[side].tail > 0.0);
-    if (!switched) continue;
-    const double shift = in_ns[side].tail - old_tail;
-    const double sign = sign_of(side);
-    const bool delay_free = this->delay_free();
-    const double doubt = 0.09 * shift * shift / (scale_ * scale_) / (delay_free ? 4.0 : 1.0);
-    bank_.for_each([=](Estimate& e) {
-      if (delay_free) {
-        e.d -= shift / 2.0;
-        e.x -= sign * shift / 2.0;
-        e.dd += doubt;
-        e.xd += sign * doubt;
-      } else {
-        e.x -= sign * shift;
-      }
-      e.xx += doubt;
-    });
-    learner_[side].move_mean(shift);
-  }
-  scale_ = common_deviation(product, sides);
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (!seen_[side]) continue;
-    shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};
-  }
-}
-
-/// Exponential mean of nu^2 / S of the best model. What is taken for an outlier
-/// counts as far as outliers are not what one expects on this path.
-template <class Grid>
-void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
-  const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
-  const double credit = innovations.credit[best_];
-  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / Gate::kOutlierStart);
-  const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);
-  surprise_level_ += kSurpriseShare * (level - surprise_level_);
-}
-
-template <class Grid>
-double Estimator<Grid>::widening() const noexcept {
-  return std::max(1.0, surprise_level_ / kUsualSurprise);
-}
-
-/// Where the floor of a queueing delay lies is known to a few per cent of its
-/// tail only; equal errors of both directions cancel in the offset. While it is
-/// open whether there is a queue at all, the floor may be off by the whole
-/// tail.
-template <class Grid>
-double Estimator<Grid>::floor_doubt_ns() const noexcept {
-  const double share = two_way() ? 0.5 : 1.0;
-  const double known = kFloorDoubt * (shape_[0].tail - (two_way() ? 1.0 : -1.0) * shape_[1].tail);
-  const double ahead = learner_[0].tail_doubt() * shape_[0].tail;
-  const double back = learner_[1].tail_doubt() * shape_[1].tail;
-  return scale_ * share * std::sqrt(known * known + ahead * ahead + back * back);
-}
-
-template <class Grid>
-double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
-  Estimate then = mixed_;
-  then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
-  const double floor = floor_doubt_ns();
-  return std::sqrt(scale_ * scale_ * widening() * std::max(then.xx, 0.0) + floor * floor);
-}
-
 template <class Grid>
 bool Estimator<Grid>::settled() const noexcept {
   return std::min(count_, since_change_) > kYoung && learner_[0].mature() && learner_[1].mature();
-}
-
-template <class Grid>
-double Estimator<Grid>::rate_sigma_ns() const noexcept {
-  return scale_ * std::sqrt(widening() * mixed_.yy);
-}
-
-template <class Grid>
-double Estimator<Grid>::delay_sigma_ns() const noexcept {
-  return std::sqrt(scale_ * scale_ * widening() * mixed_.dd + floor_doubt_ns() * floor_doubt_ns());
-}
-
-template <class Grid>
-double Estimator<Grid>::noise_ns(Direction direction) const noexcept {
-  return scale_ * std::sqrt(shape_[index_of(direction)].total_variance());
 }
 
 template class Estimator<FullGrid>;

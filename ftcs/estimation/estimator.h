@@ -127,6 +127,8 @@ class Estimator {
   static constexpr std::size_t kSize = Grid::kSize;
 
   double step(const Observation& seen) noexcept;
+  void heed(const Observation& seen, const Innovations& innovations) noexcept;
+  void learn_noise(std::size_t side, double innovation, const Innovations& innovations) noexcept;
   void begin(std::size_t side) noexcept;
   void connect_second_direction(std::size_t side) noexcept;
   void unpin_delay(double first_sign, double variance) noexcept;

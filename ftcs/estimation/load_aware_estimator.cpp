@@ -88,9 +88,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
     --explained_alone_;
   }
   explained_alone_ = std::min(explained_alone_, kExplainedAlone);
-  // What the first picture explains alone and is late for the floor may have waited, for a whole frame, or fragment, at
-  // a time: no end of a floor that is seen as often as before. An early one did not wait. A floor that is not believed
-  // yet does no harm.
+  // What the first picture explains alone and is late for the floor may have waited, for a whole
+  // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
+  // did not wait. A floor that is not believed yet does no harm.
   const bool early = own < 0.5 && !floor_.testimony().late;
   const bool disproven = early || floor_.dry() || (believed_ && !floor_.proven());
   if (explained_alone_ == kExplainedAlone && disproven) floor_.unlock();

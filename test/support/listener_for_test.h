@@ -7,9 +7,10 @@
 namespace ftcs::estimation {
 
 /// Feeds an estimator as the servo does.
-class Listener {
+template <class Heard>
+class ListenerTo {
  public:
-  explicit Listener(const test::LoadedPath& path, const KnownDelay& delay = {})
+  explicit ListenerTo(const test::LoadedPath& path, const KnownDelay& delay = {})
       : estimator_(delay), delay_(delay.mean_ns), interval_(path.interval_ns()) {
     estimator_.expect_noise_of_at_least(0.4);
   }
@@ -23,7 +24,7 @@ class Listener {
     const Estimate& e = estimator_.estimate();
     return base_ + e.x + e.y * (now - time_) / interval_;
   }
-  [[nodiscard]] const LoadAwareEstimator<FullGrid>& estimator() const { return estimator_; }
+  [[nodiscard]] const Heard& estimator() const { return estimator_; }
   [[nodiscard]] double sigma_ns(double now) const {
     return estimator_.offset_sigma_ns((now - time_) / interval_);
   }
@@ -38,12 +39,14 @@ class Listener {
     return {sign_of(message.direction), elapsed, message.reading - base_};
   }
 
-  LoadAwareEstimator<FullGrid> estimator_;
+  Heard estimator_;
   double delay_;
   double interval_;
   double base_ = 0.0;
   double time_ = 0.0;
   bool started_ = false;
 };
+
+using Listener = ListenerTo<LoadAwareEstimator<FullGrid>>;
 
 }  // namespace ftcs::estimation

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// The size and shape of the noise, and how far the estimate can be trusted.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ftcs/estimation/estimator.h"
+#include "ftcs/measurement/order_statistic.h"
+
+namespace ftcs::estimation {
+namespace {
+
+/// Six messages: short enough for the three or four that follow a change, long
+/// enough not to follow the noise. Its usual fluctuation stays below 1.6.
+constexpr double kSurpriseShare = 1.0 / 6.0;
+constexpr double kUsualSurprise = 1.6;
+constexpr double kSurpriseLimit = 100.0;
+/// Variances of both directions that differ by less are of one kind of load.
+constexpr double kAlike = 4.0;
+/// The sharpest shape tried has a normal part of a seventh of the tail. Where
+/// that is the best shape the true edge is anything between that soft and as
+/// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
+/// late (measured). Taken back is the middle; what is open is as much.
+constexpr double kEdgeBias = 0.027;
+constexpr double kFloorDoubt = 0.03;
+constexpr double kSharpest = 0.97;
+
+bool sharp(const DelayShape& shape) noexcept {
+  return shape.tail * shape.tail > kSharpest * shape.total_variance();
+}
+/// Of a queue whose floor is not seen: within the normal part of the noise, before the waits, it
+/// may lie anywhere.
+double edge_width(const DelayShape& shape) noexcept {
+  return shape.tail > 0.0 && !sharp(shape) ? std::sqrt(shape.variance) : 0.0;
+}
+
+double sign_of(std::size_t side) noexcept { return side == 0 ? 1.0 : -1.0; }
+
+std::size_t index_of(Direction direction) noexcept {
+  return direction == Direction::kForward ? 0 : 1;
+}
+/// Noise of one kind: what it is, a queue or outliers, is decided for both
+/// directions at once. One that alone took its noise for a queue would move the
+/// offset by half a tail.
+bool alike(double variance, double other) noexcept {
+  return std::max(variance, other) < kAlike * std::min(variance, other);
+}
+
+/// Geometric mean of the standard deviations of one or both directions, of the
+/// product of their variances.
+double common_deviation(double variances, int sides) noexcept {
+  const double root = std::sqrt(variances);
+  return sides == 2 ? std::sqrt(root) : root;
+}
+
+}  // namespace
+
+/// ns by which the filters put the floor of a direction too late.
+template <class Grid>
+double Estimator<Grid>::edge_bias_ns(std::size_t side) const noexcept {
+  const DelayShape& shape = shape_[side];
+  return sharp(shape) ? kEdgeBias * shape.tail * scale_ : 0.0;
+}
+
+template <class Grid>
+void Estimator<Grid>::mix() noexcept {
+  mixed_ = bank_.mixture(weight_, scale_);
+  const double ahead = edge_bias_ns(0);
+  const double back = edge_bias_ns(1);
+  if (delay_free()) {
+    mixed_.x -= (ahead - back) / 2.0;
+    mixed_.d -= (ahead + back) / 2.0;
+  } else {
+    mixed_.x -= ahead - back;
+  }
+  process_ = bank_.mean_noise(weight_);
+}
+
+template <class Grid>
+void Estimator<Grid>::follow_scale() noexcept {
+  if (residuals_.size() > 0) {
+    robust_scale_ = std::max(least_noise_, kMadToSigma * residuals_.median());
+  }
+  if (evidence_.messages() > 4.0 &&
+      evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
+    // Old gross errors are all that the evidence tells. The model that has
+    // coped is right by now; without evidence any other might be chosen.
+    evidence_.forget();
+    const Estimate coped = bank_.estimate(best_);
+    bank_.for_each([&coped](Estimate& e) { e = coped; });
+  }
+  // Fourth root of both directions' variances: the scale is their geometric
+  // mean.
+  double learnt = 1.0;
+  double assumed = 1.0;
+  int sides = 0;
+  bool mature = true;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    ++sides;
+    mature = mature && learner_[side].mature();
+    learnt *= learner_[side].variance();
+    assumed *= shape_[side].total_variance();
+  }
+  scale_ = robust_scale_;
+  if (!mature) return;
+  const double wanted = common_deviation(learnt / assumed, sides);
+  // What is learnt may be below what rounding makes: stamps that agree to the digit for seconds.
+  scale_ = std::max(least_noise_, std::clamp(wanted, 0.6 * robust_scale_, 2.5 * robust_scale_));
+}
+
+/// Brings the learnt shapes into use. When a tail appears or goes, the zero of
+/// the delay moves from the mean to the floor or back by `shift`; half of it
+/// was offset, half path delay, known to about 30 per cent.
+template <class Grid>
+void Estimator<Grid>::adopt_shapes() noexcept {
+  double product = 1.0;
+  int sides = 0;
+  std::array<DelayShape, 2> in_ns{};
+  std::array<typename NoiseLearner<Grid::kNoiseWindow>::Case, 2> said{learner_[0].plead(),
+                                                                      learner_[1].plead()};
+  if (two_way() && alike(learner_[0].variance(), learner_[1].variance())) {
+    said[0].add(said[1]);
+    said[1] = said[0];
+  }
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    ++sides;
+    const double old_tail = scale_ * shape_[side].tail;
+    in_ns[side] = learner_[side].decide(said[side]);
+    in_ns[side].variance = std::max(in_ns[side].variance, least_noise_ * least_noise_);
+    product *= in_ns[side].total_variance();
+    const bool switched = (old_tail > 0.0) != (in_ns[side].tail > 0.0);
+    if (!switched) continue;
+    const double shift = in_ns[side].tail - old_tail;
+    const double sign = sign_of(side);
+    const bool delay_free = this->delay_free();
+    const double doubt = 0.09 * shift * shift / (scale_ * scale_) / (delay_free ? 4.0 : 1.0);
+    bank_.for_each([=](Estimate& e) {
+      if (delay_free) {
+        e.d -= shift / 2.0;
+        e.x -= sign * shift / 2.0;
+        e.dd += doubt;
+        e.xd += sign * doubt;
+      } else {
+        e.x -= sign * shift;
+      }
+      e.xx += doubt;
+    });
+    learner_[side].move_mean(shift);
+  }
+  scale_ = common_deviation(product, sides);
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!seen_[side]) continue;
+    shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};
+  }
+}
+
+/// Exponential mean of nu^2 / S of the best model. What is taken for an outlier
+/// counts as far as outliers are not what one expects on this path.
+template <class Grid>
+void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
+  const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
+  const double credit = innovations.credit[best_];
+  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / Gate::kOutlierStart);
+  const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);
+  surprise_level_ += kSurpriseShare * (level - surprise_level_);
+}
+
+template <class Grid>
+double Estimator<Grid>::widening() const noexcept {
+  return std::max(1.0, surprise_level_ / kUsualSurprise);
+}
+
+/// Where the floor of a queueing delay lies is known to a few per cent of its
+/// tail only; equal errors of both directions cancel in the offset. While it is
+/// open whether there is a queue at all, the floor may be off by the whole
+/// tail.
+template <class Grid>
+double Estimator<Grid>::floor_doubt_ns() const noexcept {
+  const double share = two_way() ? 0.5 : 1.0;
+  const double known = kFloorDoubt * (shape_[0].tail - (two_way() ? 1.0 : -1.0) * shape_[1].tail);
+  const double soft = edge_width(shape_[0]) - (two_way() ? 1.0 : -1.0) * edge_width(shape_[1]);
+  const double ahead = learner_[0].tail_doubt() * shape_[0].tail;
+  const double back = learner_[1].tail_doubt() * shape_[1].tail;
+  return scale_ * share * std::sqrt(known * known + soft * soft + ahead * ahead + back * back);
+}
+
+template <class Grid>
+double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
+  Estimate then = mixed_;
+  then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
+  const double floor = floor_doubt_ns();
+  return std::sqrt(scale_ * scale_ * widening() * std::max(then.xx, 0.0) + floor * floor);
+}
+
+template <class Grid>
+double Estimator<Grid>::rate_sigma_ns() const noexcept {
+  return scale_ * std::sqrt(widening() * mixed_.yy);
+}
+
+template <class Grid>
+double Estimator<Grid>::delay_sigma_ns() const noexcept {
+  return std::sqrt(scale_ * scale_ * widening() * mixed_.dd + floor_doubt_ns() * floor_doubt_ns());
+}
+
+template <class Grid>
+double Estimator<Grid>::noise_ns(Direction direction) const noexcept {
+  return scale_ * std::sqrt(shape_[index_of(direction)].total_variance());
+}
+
+template void Estimator<FullGrid>::mix() noexcept;
+template void Estimator<FullGrid>::follow_scale() noexcept;
+template void Estimator<FullGrid>::adopt_shapes() noexcept;
+template void Estimator<FullGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
+template double Estimator<FullGrid>::offset_sigma_ns(double) const noexcept;
+template double Estimator<FullGrid>::rate_sigma_ns() const noexcept;
+template double Estimator<FullGrid>::delay_sigma_ns() const noexcept;
+template double Estimator<FullGrid>::noise_ns(Direction) const noexcept;
+template void Estimator<SmallGrid>::mix() noexcept;
+template void Estimator<SmallGrid>::follow_scale() noexcept;
+template void Estimator<SmallGrid>::adopt_shapes() noexcept;
+template void Estimator<SmallGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
+template double Estimator<SmallGrid>::offset_sigma_ns(double) const noexcept;
+template double Estimator<SmallGrid>::rate_sigma_ns() const noexcept;
+template double Estimator<SmallGrid>::delay_sigma_ns() const noexcept;
+template double Estimator<SmallGrid>::noise_ns(Direction) const noexcept;
+
+}  // namespace ftcs::estimation
