@@ -2,7 +2,6 @@
 // A PTP receiver over your own transport: octets and stamps in, octets out. Here a socket pair; its
 // far end transmits.
 #include <ctime>
-#include <unistd.h>
 
 #include "examples/socket_pair.h"
 #include "ftcs/clock/virtual_clock.h"
@@ -24,12 +23,9 @@ int main() {
   config.follower.discipline.step.mode = StepMode::kFirst;  // it starts at zero
   node::ReceiverNode receiver(config, clock);
   example::SocketPair sockets(host);
-  const auto act = [&] {  // after each input
-    while (const auto event = receiver.next()) {
-      const ptp::SendMessage* send = example::to_send(*event);  // others tell, you may log them
-      if (send == nullptr || !sockets.send(*send)) continue;
-      receiver.on_transmit_timestamp(send->id(), host.now(), host.now());
-    }
+  const auto act = [&] {  // after each input, all of it; other events tell, you may log them
+    while (const auto event = receiver.next())
+      if (const auto* send = example::to_send(*event)) sockets.send(*send);
   };
   receiver.start(host.now());
   for (int turn = 0; turn < 20'000 && !receiver.locked(); ++turn, example::wait(), act()) {
@@ -38,6 +34,10 @@ int main() {
       // Yours: the first host.now() is the stamp of the network adapter.
       message->event ? receiver.on_event_message(message->view(), host.now(), host.now())
                      : receiver.on_general_message(message->view(), host.now());
+      act();
+    }
+    while (const auto sent = sockets.sent()) {
+      receiver.on_transmit_timestamp(sent->id, sent->at, host.now());
       act();
     }
     if (receiver.deadline() && *receiver.deadline() <= host.now()) receiver.on_timer(host.now());

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <optional>
 #include <span>
 #include <sys/socket.h>
@@ -21,6 +22,11 @@ struct Datagram {
   std::array<std::uint8_t, 128> octets{};
   std::size_t size = 0;
   [[nodiscard]] std::span<const std::uint8_t> view() const { return {octets.data(), size}; }
+};
+
+struct Sent {
+  ftcs::ptp::EventId id;
+  ftcs::FreeRunningTime at;
 };
 
 /// None: the event is no message that shall be sent.
@@ -42,11 +48,17 @@ class SocketPair {
   SocketPair(const SocketPair&) = delete;
   SocketPair& operator=(const SocketPair&) = delete;
 
-  /// True: an event message, whose transmit stamp is wanted.
-  [[nodiscard]] bool send(const ftcs::ptp::SendMessage& message) {
+  void send(const ftcs::ptp::SendMessage& message) {
     put(sockets_[0], message);
+    if (message.channel == ftcs::ptp::Channel::kEvent) sent_.push_back({message.id(), host_.now()});
     far_end();  // at once: what it stamps late would be asymmetry of the path
-    return message.channel == ftcs::ptp::Channel::kEvent;
+  }
+  /// The stamp of an event message that has left, once, as a kernel's error queue tells it.
+  [[nodiscard]] std::optional<Sent> sent() {
+    if (sent_.empty()) return std::nullopt;
+    const Sent first = sent_.front();
+    sent_.pop_front();
+    return first;
   }
   [[nodiscard]] std::optional<Datagram> receive() { return get(sockets_[0]); }
 
@@ -97,6 +109,7 @@ class SocketPair {
   ftcs::FreeRunningSource& host_;
   std::array<int, 2> sockets_{};
   bool started_ = false;
+  std::deque<Sent> sent_{};
   ftcs::ptp::TimeTransmitter transmitter_{{.port = {{2}, 1},
                                            .log_announce_interval = -3,
                                            .log_sync_interval = -4,
