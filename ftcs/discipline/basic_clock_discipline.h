@@ -10,6 +10,8 @@
 #include "ftcs/discipline/rate_change_limit.h"
 #include "ftcs/discipline/step_policy.h"
 #include "ftcs/discipline/telemetry.h"
+#include "ftcs/measurement/sample_interval.h"
+#include "ftcs/servo/in_order.h"
 #include "ftcs/servo/servo.h"
 
 namespace ftcs {
@@ -29,7 +31,7 @@ struct DisciplineRules {
   /// Sync intervals without a usable sample before holdover: more than one or two lost messages. A
   /// sample that the servo refused is usable for that while the clock is within what a lock means,
   /// by the servo's deviation and by the sample's own word.
-  std::uint32_t missed_intervals_to_holdover = 4;
+  std::uint32_t missed_intervals_to_holdover = kOutageIntervals;
 };
 
 /// What the discipline has to know of its servo. ClockDiscipline fills it in for the servos of the
@@ -81,8 +83,7 @@ class BasicClockDiscipline {
         limits_(intersect(servo.limits, clock.rate_limits())),
         servo_(make(limits_)),
         lock_(rules.lock),
-        rate_change_(rules.largest_rate_change),
-        sync_interval_(servo.sync_interval) {}
+        rate_change_(rules.largest_rate_change) {}
 
   /// Before the first message: from now on at this rate (local per free running), which somebody
   /// knows already; cut to the limits. The clock's error, if it did not take it. It does not count
@@ -150,6 +151,7 @@ class BasicClockDiscipline {
   ServoTraits traits_;
   AdjustableClock& clock_;
   RateLimits limits_;
+  MessageOrder order_{};
   Servo servo_;
   LockDetector lock_;
   RateChangeLimit rate_change_;
@@ -161,10 +163,7 @@ class BasicClockDiscipline {
   bool awaits_sample_ = false;  ///< of another reference, since waiting_since_
   FreeRunningTime waiting_since_{};
   EventPair last_sample_{};
-  /// Configured, or the shorter one of the last two gaps between samples: an outage is no
-  /// interval.
-  Duration sync_interval_{};
-  Duration last_gap_{};
+  SampleInterval sync_interval_{};  ///< asked where none is configured
   Duration announced_interval_{};
   Telemetry telemetry_{};
   DisciplineCounters counters_{};

@@ -28,7 +28,7 @@ Telemetry BasicClockDiscipline<Servo>::on_pair(const EventPair& event, bool pace
   begin(now);
   const TimestampPair pair{event.direction, event.reference, clock_.local_at(event.free_running),
                            event.free_running};
-  const ServoUpdate update = servo_.update(pair, now);
+  const ServoUpdate update = update_in_order(order_, servo_, pair, now);
   telemetry_.direction = event.direction;
   telemetry_.verdict = update.verdict;
   const bool used = update.verdict == SampleVerdict::kUsed;
@@ -58,22 +58,19 @@ Telemetry BasicClockDiscipline<Servo>::on_silence() noexcept {
     if (telemetry_.servo.offset_known) telemetry_.servo = known(servo_.snapshot_at(now));
   }
   check_silence(now);
-  // What is silence is decided here: the servo knows only the gaps that it saw.
-  if (!in_holdover_ && telemetry_.servo.state == ServoState::kHoldover) {
-    telemetry_.servo.state = servo_.snapshot().state;
-  }
   return finish();
 }
 
 template <ClockServo Servo>
 void BasicClockDiscipline<Servo>::on_new_reference() noexcept {
+  order_.reset();
   servo_.reset();
   lock_.reset();
   awaits_sample_ = has_sample_ || awaits_sample_;
   has_sample_ = false;
   samples_ = 0;
   waiting_since_ = clock_.read().free_running;
-  last_gap_ = Duration{};
+  sync_interval_.forget_gap();
   announced_interval_ = Duration{};
   in_holdover_ = false;
   path_delay_measured_ = false;
@@ -169,9 +166,7 @@ bool BasicClockDiscipline<Servo>::lock_survives(const TimestampPair& refused) co
 template <ClockServo Servo>
 void BasicClockDiscipline<Servo>::note_sample(const EventPair& pair) noexcept {
   if (has_sample_ && traits_.sync_interval == Nanoseconds{0}) {
-    const Duration gap = pair.reference - last_sample_.reference;
-    sync_interval_ = last_gap_ > Duration{} ? std::min(gap, last_gap_) : gap;
-    last_gap_ = gap;
+    sync_interval_.add(pair.reference - last_sample_.reference);
   }
   last_sample_ = pair;
   has_sample_ = true;
@@ -183,12 +178,12 @@ void BasicClockDiscipline<Servo>::note_sample(const EventPair& pair) noexcept {
 template <ClockServo Servo>
 void BasicClockDiscipline<Servo>::check_silence(const ClockReading& reading) noexcept {
   const bool configured = traits_.sync_interval > Nanoseconds{0};
-  const Duration interval =
-      configured ? sync_interval_ : std::max(sync_interval_, announced_interval_);
+  const Duration interval = configured ? Duration{traits_.sync_interval}
+                                       : std::max(sync_interval_.value(), announced_interval_);
   if (!(has_sample_ || awaits_sample_) || in_holdover_ || interval <= Duration{}) return;
   const FreeRunningTime since = has_sample_ ? last_sample_.free_running : waiting_since_;
-  const double silence_ns = (reading.free_running - since).ns();
-  if (silence_ns <= interval.ns() * config_.missed_intervals_to_holdover) return;
+  const Duration silence = reading.free_running - since;
+  if (!is_outage(silence, interval, config_.missed_intervals_to_holdover)) return;
   in_holdover_ = true;
   ++counters_.holdovers;
 }

@@ -6,7 +6,8 @@
 #include <cstdint>
 
 #include "ftcs/discipline/lock_detector.h"
-#include "ftcs/servo/any_servo.h"
+#include "ftcs/servo/adaptive/adaptive_servo.h"
+#include "ftcs/servo/in_order.h"
 
 namespace ftcs {
 
@@ -113,7 +114,7 @@ class BusClock {
   }
 
   BusClockConfig config_;
-  AdaptiveServo estimator_;
+  InOrder<AdaptiveServo> estimator_;
   LockDetector lock_;
   BusClockDecision decision_;
   std::uint32_t cycles_per_sample_;

@@ -124,6 +124,33 @@ TEST_F(ClockDisciplineTest, missing_samples_mean_holdover_at_the_tracking_rate) 
   EXPECT_EQ(sync().servo.state, ServoState::kLocked);
 }
 
+TEST_F(ClockDisciplineTest, holdover_begins_after_four_intervals_whatever_the_servo) {
+  for (const ServoKind kind : {ServoKind::kFtcs, ServoKind::kPics, ServoKind::kLinuxptpPi,
+                               ServoKind::kAdaptive, ServoKind::kRegression, ServoKind::kKalman}) {
+    start(Duration{}, config_for(kind));
+    for (int n = 0; n < 20; ++n) sync_and_wait();
+    advance(3 * kInterval);
+    EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kLocked) << servo_kind_name(kind);
+    advance(Nanoseconds{1});
+    EXPECT_EQ(discipline_->on_silence().servo.state, ServoState::kHoldover)
+        << servo_kind_name(kind);
+  }
+}
+
+/// Asked in front of the servo: what is no news does not reach it, and is counted.
+TEST_F(ClockDisciplineTest, a_reference_that_was_set_back_is_followed_at_the_third_message) {
+  for (const ServoKind kind : {ServoKind::kFtcs, ServoKind::kAdaptive, ServoKind::kPid}) {
+    reference_jump_ = Duration{};
+    start(Duration{}, config_for(kind));
+    for (int n = 0; n < 20; ++n) sync_and_wait();
+    reference_jump_ = Nanoseconds{-10s};
+    EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kImplausible) << servo_kind_name(kind);
+    EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kImplausible) << servo_kind_name(kind);
+    EXPECT_EQ(sync_and_wait().verdict, SampleVerdict::kUsed) << servo_kind_name(kind);
+    EXPECT_EQ(discipline_->counters().implausible, 2U) << servo_kind_name(kind);
+  }
+}
+
 TEST_F(ClockDisciplineTest, messages_that_do_not_steer_do_not_prevent_holdover) {
   start(Duration{}, config_for(ServoKind::kFtcs));
   for (int n = 0; n < 20; ++n) sync_and_wait();

@@ -6,6 +6,7 @@
 #include "ftcs/clock/cycle_timer.h"
 #include "ftcs/clock/steering_history.h"
 #include "ftcs/discipline/cycle_servo_types.h"
+#include "ftcs/servo/in_order.h"
 
 namespace ftcs {
 

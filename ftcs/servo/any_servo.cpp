@@ -137,6 +137,18 @@ void AnyServo::on_step(Duration step) noexcept {
       servo_);
 }
 
+void AnyServo::on_new_epoch() noexcept {
+  ftcs::visit(
+      [](auto& servo) noexcept {
+        if constexpr (requires { servo.on_new_epoch(); }) {
+          servo.on_new_epoch();
+        } else {
+          servo.reset();
+        }
+      },
+      servo_);
+}
+
 void AnyServo::free_path_delay(double sigma_ns) noexcept {
   ftcs::visit(
       [sigma_ns](auto& servo) noexcept {

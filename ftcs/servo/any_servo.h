@@ -116,6 +116,8 @@ class AnyServo {
   /// The clock has been stepped by somebody else; a servo that lives in free-running time need not
   /// know.
   void on_step(Duration step) noexcept;
+  /// A clock was set back: on_new_epoch() of the servo, or reset() where it has none.
+  void on_new_epoch() noexcept;
   /// AdaptiveServo::free_path_delay(); nothing where the servo has none.
   void free_path_delay(double sigma_ns) noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;

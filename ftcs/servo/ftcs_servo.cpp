@@ -6,10 +6,6 @@
 namespace ftcs {
 namespace {
 
-/// Four intervals without a sample are an outage: one or two lost messages are not (the
-/// discipline's holdover begins at the same number).
-constexpr double kOutageIntervals = 4.0;
-
 /// The correction ends T_c after the *sample* (Fig. 3: local and reference meet at tau_rd(n) +
 /// T_c), however late the command comes. A command that is later than half of T_c would need more
 /// than twice the rate: it takes its half of T_c all the same.
@@ -64,23 +60,19 @@ ServoUpdate FtcsServo::update(const SyncSample& sample, const ClockReading& now)
   snapshot_.offset = sample.offset();
   snapshot_.path_delay = sample.path_delay;
   state_.previous = instant_of(sample);
+  state_.interval.add(progress.reference);
   // What the clock gathered in an outage is an offset to be removed as at the start, not a trickle
   // for p.
-  if (progress.reference.ns() > kOutageIntervals * sync_interval(progress).ns()) {
+  if (is_outage(progress.reference, sync_interval())) {
     state_.phase = Phase::kPrimed;
     state_.converged = ConvergenceLatch{};
   }
-  const ServoUpdate update = steer(sample, now, progress);
-  state_.last_interval = progress.reference;
-  return update;
+  return steer(sample, now, progress);
 }
 
-Duration FtcsServo::sync_interval(const SampleProgress& progress) const noexcept {
+Duration FtcsServo::sync_interval() const noexcept {
   if (config_.sync_interval > Nanoseconds{0}) return config_.sync_interval;
-  // Of the last two gaps the shorter: a missing message does not make the interval longer.
-  const bool shorter_before =
-      state_.last_interval > Duration{} && state_.last_interval < progress.reference;
-  return shorter_before ? state_.last_interval : progress.reference;
+  return state_.interval.value();
 }
 
 void FtcsServo::reset() noexcept {
@@ -110,7 +102,7 @@ ServoUpdate FtcsServo::steer(const SyncSample& sample, const ClockReading& now,
 
   const Duration wanted_time = config_.correction_time > Nanoseconds{0}
                                    ? Duration{config_.correction_time}
-                                   : sync_interval(progress);
+                                   : sync_interval();
   const Duration correction_time =
       remaining_time(wanted_time, waited + Duration::from_ns(extra_ns));
   // (1 + p T_offset / T_c) k a with T_offset = -offset   (17), (19)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "ftcs/measurement/sample_interval.h"
 #include "ftcs/servo/converged_band.h"
 #include "ftcs/servo/sample_progress.h"
 #include "ftcs/servo/servo.h"
@@ -97,11 +98,11 @@ class FtcsServo {
   struct State {
     Phase phase = Phase::kEmpty;
     SampleInstant previous{};
-    Duration last_interval{};  ///< between the last two samples; zero: there were none
+    SampleInterval interval{};
     ConvergenceLatch converged{};
   };
 
-  [[nodiscard]] Duration sync_interval(const SampleProgress& progress) const noexcept;
+  [[nodiscard]] Duration sync_interval() const noexcept;
   [[nodiscard]] double gain_for(double offset_ns) noexcept;
   [[nodiscard]] ServoUpdate steer(const SyncSample& sample, const ClockReading& now,
                                   const SampleProgress& progress) noexcept;

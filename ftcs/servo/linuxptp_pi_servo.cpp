@@ -78,11 +78,12 @@ LinuxptpPiServo::LinuxptpPiServo(const LinuxptpPiConfig& config) noexcept
 
 void LinuxptpPiServo::reset() noexcept {
   phase_ = Phase::kEmpty;
+  has_previous_ = false;
   snapshot_.state = ServoState::kUnlocked;
 }
 
 ServoUpdate LinuxptpPiServo::update(const SyncSample& sample, const ClockReading&) noexcept {
-  if (phase_ != Phase::kEmpty && sample.free_running - previous_.free_running <= Duration{}) {
+  if (has_previous_ && sample.free_running - previous_.free_running <= Duration{}) {
     return {SampleVerdict::kDuplicate, false, {}};
   }
   snapshot_.offset = sample.offset();
@@ -101,6 +102,7 @@ ServoUpdate LinuxptpPiServo::update(const SyncSample& sample, const ClockReading
       break;
   }
   previous_ = sample;
+  has_previous_ = true;
   return update;
 }
 

@@ -76,6 +76,12 @@ class LinuxptpPiServo {
   /// Back to s0. The drift stays in use until two samples have given a new one; a first step is not
   /// repeated.
   void reset() noexcept;
+  /// A clock was set back. The original goes on: an offset is an offset, whatever made it. Only a
+  /// frequency that is still being measured begins anew.
+  void on_new_epoch() noexcept {
+    has_previous_ = false;
+    if (phase_ == Phase::kEstimating) phase_ = Phase::kEmpty;
+  }
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
   /// Zero until the interval is known.
   [[nodiscard]] PiGains gains() const noexcept { return gains_; }
@@ -93,6 +99,7 @@ class LinuxptpPiServo {
   bool first_lock_ = true;
   double drift_ppb_ = 0.0;
   SyncSample first_{};
+  bool has_previous_ = false;
   SyncSample previous_{};
   ServoSnapshot snapshot_{};
 };

@@ -53,8 +53,8 @@ class TwoWayServo {
   TwoWayServo(const TwoWayConfig& config, const typename Law::Config& law) noexcept
       : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
 
-  /// Forward: the law's verdict and command; kRejected by the gate, kDuplicate for a message that
-  /// is newer than the last one on neither clock. Backward: never a command; kImplausible where the
+  /// Messages come in order (in_order.h). Forward: the law's verdict and command; kRejected by the
+  /// gate. Backward: never a command; kImplausible where the
   /// path delay it tells is impossible (PathDelayConfig), kUsed for any other, even without a use.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept {
     return pair.direction == Direction::kForward ? on_forward(pair, now) : on_backward(pair);
@@ -65,7 +65,18 @@ class TwoWayServo {
     delay_.reset();
     gate_.reset();
     law_.reset();
-    has_latest_ = law_fed_ = false;
+    law_fed_ = false;
+  }
+
+  /// A clock was set back: what was measured across it is void, the path delay stands.
+  void on_new_epoch() noexcept {
+    gate_.reset();
+    delay_.restart();
+    if constexpr (requires { law_.on_new_epoch(); }) {
+      law_.on_new_epoch();
+    } else {
+      law_.reset();
+    }
   }
 
   /// The clock has been stepped by somebody else, by so much (positive: ahead). Path delay and gate
@@ -99,10 +110,6 @@ class TwoWayServo {
   [[nodiscard]] SyncSample sample_of(const TimestampPair& pair) const noexcept {
     return {pair.reference, path_delay(), pair.local, pair.free_running};
   }
-  [[nodiscard]] static bool newer(const TimestampPair& pair, const TimestampPair& than) noexcept {
-    return pair.reference - than.reference > Duration{} ||
-           pair.free_running - than.free_running > Duration{};
-  }
 
   [[nodiscard]] GateDecision judge(const TimestampPair& pair) noexcept {
     const bool rate_known = config_.path_delay.rate_compensated && delay_.rate_known();
@@ -114,9 +121,6 @@ class TwoWayServo {
   }
 
   ServoUpdate on_forward(const TimestampPair& pair, const ClockReading& now) noexcept {
-    if (has_latest_ && !newer(pair, latest_)) return {SampleVerdict::kDuplicate, false, {}};
-    latest_ = pair;
-    has_latest_ = true;
     const GateDecision decision = judge(pair);
     if (decision == GateDecision::kReject) return {SampleVerdict::kRejected, false, {}};
     if (decision == GateDecision::kExit) {
@@ -149,9 +153,7 @@ class TwoWayServo {
   PathDelayEstimator delay_;
   OutlierGate gate_;
   Law law_;
-  bool has_latest_ = false;
   bool law_fed_ = false;
-  TimestampPair latest_{};    ///< newest forward message, used or not
   TimestampPair accepted_{};  ///< newest forward message that was not rejected
 };
 

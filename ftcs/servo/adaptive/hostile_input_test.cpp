@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/servo/adaptive/adaptive_servo.h"
+#include "ftcs/servo/in_order.h"
 
 namespace ftcs {
 namespace {
@@ -164,7 +165,7 @@ class HostileStream {
 
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
-  AdaptiveServo servo_;
+  InOrder<AdaptiveServo> servo_;
   RateLimits limits_ = AdaptiveConfig{}.steering.rate;
   double interval_ = 1e9, noise_ = 100.0, path_ = 10'000.0, skew_ = 0.0;
   std::int64_t now_ = 1'700'000'000'000'000'000;  // where the good world stands

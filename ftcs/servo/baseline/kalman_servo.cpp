@@ -42,17 +42,6 @@ KalmanServo::KalmanServo(const KalmanConfig& config) noexcept
     known_delay_ns_ = static_cast<double>(config.fixed_path_delay->count());
 }
 
-SampleVerdict KalmanServo::check_order(const TimestampPair& pair) noexcept {
-  const std::size_t side = pair.direction == Direction::kForward ? 0 : 1;
-  const bool reference_newer = !has_latest_[side] || pair.reference > latest_[side].reference;
-  const bool local_newer = !has_latest_[side] || pair.free_running > latest_[side].free_running;
-  if (reference_newer != local_newer) return SampleVerdict::kImplausible;
-  if (!reference_newer) return SampleVerdict::kDuplicate;
-  latest_[side] = pair;
-  has_latest_[side] = true;
-  return SampleVerdict::kUsed;
-}
-
 void KalmanServo::observe(const TimestampPair& pair) noexcept {
   const double sign = pair.direction == Direction::kForward ? 1.0 : -1.0;
   const Duration raw = pair.free_running.since_epoch() - pair.reference.since_epoch();
@@ -95,13 +84,12 @@ ServoUpdate KalmanServo::steer(const ClockReading& now) noexcept {
 
 ServoUpdate KalmanServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
   if (config_.fixed_path_delay && pair.direction == Direction::kBackward) return {};
-  const SampleVerdict order = check_order(pair);
-  if (order != SampleVerdict::kUsed) return {order, false, {}};
+  heard_[pair.direction] = true;
   observe(pair);
   // Two messages of a known delay, or three with both directions, determine all states.
   const bool determined = config_.fixed_path_delay
                               ? messages_ >= 2
-                              : messages_ >= 3 && has_latest_[0] && has_latest_[1];
+                              : messages_ >= 3 && heard_.forward && heard_.backward;
   return determined ? steer(now) : ServoUpdate{};
 }
 

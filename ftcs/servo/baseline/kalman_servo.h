@@ -7,6 +7,7 @@
 #include "ftcs/servo/baseline/kalman_filter.h"
 #include "ftcs/servo/servo.h"
 #include "ftcs/servo/servo_config_error.h"
+#include "ftcs/time/per_direction.h"
 
 namespace ftcs {
 
@@ -34,14 +35,13 @@ class KalmanServo {
   explicit KalmanServo(const KalmanConfig& config = {}) noexcept;
 
   /// Commands at every message of either direction, from the third on, once both have come (with a
-  /// known delay from the second on; backward messages are then not heard). kDuplicate: newer on
-  /// neither clock, kImplausible: on one alone; against the last message of its direction.
+  /// known delay from the second on; backward messages are then not heard). Messages come in
+  /// order (in_order.h).
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   void reset() noexcept { *this = KalmanServo(config_); }
   [[nodiscard]] ServoSnapshot snapshot() const noexcept { return snapshot_; }
 
  private:
-  [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
   void observe(const TimestampPair& pair) noexcept;
   [[nodiscard]] ServoUpdate steer(const ClockReading& now) noexcept;
 
@@ -52,8 +52,7 @@ class KalmanServo {
   unsigned messages_ = 0;
   Duration base_{};        ///< first free running minus reference: keeps the states small
   ReferenceTime event_{};  ///< reference time of the last event at the local clock
-  TimestampPair latest_[2] = {};
-  bool has_latest_[2] = {};
+  PerDirection<bool> heard_{};
   ServoSnapshot snapshot_{};
 };
 

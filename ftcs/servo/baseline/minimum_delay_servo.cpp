@@ -22,18 +22,6 @@ std::optional<ServoConfigError> validate(const MinimumDelayConfig& config) noexc
   return std::nullopt;
 }
 
-SampleVerdict MinimumDelayServo::check_order(const TimestampPair& pair) noexcept {
-  const std::size_t side = pair.direction == Direction::kForward ? 0 : 1;
-  const bool known = has_latest_[side];
-  const bool reference_newer = !known || pair.reference > latest_[side].reference;
-  const bool local_newer = !known || pair.free_running > latest_[side].free_running;
-  if (reference_newer != local_newer) return SampleVerdict::kImplausible;
-  if (!reference_newer) return SampleVerdict::kDuplicate;
-  latest_[side] = pair;
-  has_latest_[side] = true;
-  return SampleVerdict::kUsed;
-}
-
 MinimumDelayServo::Stamp MinimumDelayServo::stamp_of(const TimestampPair& pair) const noexcept {
   const Duration reference = pair.reference - first_.reference;
   const Duration free = pair.free_running - first_.free_running;
@@ -175,8 +163,6 @@ bool MinimumDelayServo::add(const TimestampPair& pair) noexcept {
 }
 
 ServoUpdate MinimumDelayServo::update(const TimestampPair& pair, const ClockReading& now) noexcept {
-  const SampleVerdict order = check_order(pair);
-  if (order != SampleVerdict::kUsed) return {order, false, {}};
   if (!started_) first_ = pair;
   started_ = true;
   if (!add(pair)) return {};

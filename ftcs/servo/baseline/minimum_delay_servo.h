@@ -65,7 +65,6 @@ class MinimumDelayServo {
     double delay = 0.0;
   };
 
-  [[nodiscard]] SampleVerdict check_order(const TimestampPair& pair) noexcept;
   [[nodiscard]] Stamp stamp_of(const TimestampPair& pair) const noexcept;
   [[nodiscard]] bool add(const TimestampPair& pair) noexcept;
   void add_point(const Point& point) noexcept;
@@ -84,8 +83,6 @@ class MinimumDelayServo {
   std::array<Point, kPoints> points_{};
   std::size_t count_ = 0;   ///< points ever
   std::size_t length_ = 0;  ///< points in use
-  std::array<TimestampPair, 2> latest_{};
-  std::array<bool, 2> has_latest_{};
   TimestampPair first_{};
   bool started_ = false;
   std::optional<Stamp> forward_{};

@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "ftcs/servo/in_order.h"
+
 namespace ftcs {
 namespace {
 
@@ -95,7 +97,7 @@ TEST(MinimumDelayServo, commands_the_rate_of_the_line) {
 
 TEST(MinimumDelayServo, repeated_and_impossible_messages_change_nothing) {
   World world;
-  MinimumDelayServo servo;
+  InOrder<MinimumDelayServo> servo;
   const TimestampPair sync = world.forward(5);
   (void)servo.update(sync, {sync.free_running, sync.local});
   EXPECT_EQ(servo.update(sync, {}).verdict, SampleVerdict::kDuplicate);
