@@ -52,27 +52,27 @@ TEST(ConfigFile, settings_mean_what_they_mean_to_ptp4l) {
       "[eth3]\n"
       "delayAsymmetry -100\n");
   EXPECT_EQ(options.interface, "eth3");
-  EXPECT_EQ(options.domain, 24);
-  EXPECT_EQ(options.log_sync_interval, -3);
+  EXPECT_EQ(options.protocol.domain, 24);
+  EXPECT_EQ(options.transmitter.log_sync_interval, -3);
   EXPECT_EQ(options.timestamps, platform::TimestampMode::kSoftware);
   EXPECT_EQ(options.socket.tx_timestamp_timeout, Nanoseconds{50'000'000});
-  EXPECT_EQ(options.first_step_threshold, Nanoseconds{20'000});
-  EXPECT_NEAR(options.servo.limits.fastest.ppb(), 100'000.0, 1e-3);
-  EXPECT_EQ(options.egress_latency, Nanoseconds{12});
-  EXPECT_EQ(options.delay_asymmetry, Nanoseconds{-100});
-  EXPECT_EQ(options.servo.two_way.path_delay.filter.length, 4U);
-  EXPECT_TRUE(options.delay_filter_given);
-  EXPECT_EQ(options.servo.kind, ServoKind::kLinuxptpPi);
-  EXPECT_DOUBLE_EQ(options.servo.linuxptp_pi.proportional_const, 0.7);
-  EXPECT_EQ(to_text(*options.clock_identity).view(), "001122.fffe.334455");
+  EXPECT_EQ(options.follower.first_step_threshold, Nanoseconds{20'000});
+  EXPECT_NEAR(options.follower.servo.limits.fastest.ppb(), 100'000.0, 1e-3);
+  EXPECT_EQ(options.protocol.egress_latency, Nanoseconds{12});
+  EXPECT_EQ(options.receiver.delay_asymmetry, Nanoseconds{-100});
+  EXPECT_EQ(options.follower.servo.two_way.path_delay.filter.length, 4U);
+  EXPECT_TRUE(options.follower.filter_is_chosen);
+  EXPECT_EQ(options.follower.servo.kind, ServoKind::kLinuxptpPi);
+  EXPECT_DOUBLE_EQ(options.follower.servo.linuxptp_pi.proportional_const, 0.7);
+  EXPECT_EQ(to_text(*options.protocol.clock_identity).view(), "001122.fffe.334455");
 }
 
 TEST(ConfigFile, delay_filters_are_ptp4ls_and_one_more) {
   const auto kind = [](const std::string& name) {
     const daemon::PtpOptions options =
         options_of(("[global]\ndelay_filter " + name + "\n").c_str());
-    EXPECT_TRUE(options.delay_filter_given);
-    return options.servo.two_way.path_delay.filter.kind;
+    EXPECT_TRUE(options.follower.filter_is_chosen);
+    return options.follower.servo.two_way.path_delay.filter.kind;
   };
   EXPECT_EQ(kind("moving_median"), DelayFilterKind::kMovingMedian);
   EXPECT_EQ(kind("moving_minimum"), DelayFilterKind::kMovingMinimum);
@@ -123,24 +123,25 @@ TEST(Presets, gptp_is_an_end_station_of_802_1as) {
   EXPECT_EQ(apply_preset(options, "gptp").value_or(""), "");
   EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kEthernet);
   EXPECT_EQ(options.socket.primary_mac, options.socket.peer_mac);
-  EXPECT_TRUE(options.peer_to_peer());
-  EXPECT_TRUE(options.peer_delay_config().capability_needed);
-  EXPECT_EQ(options.peer_delay_config().highest, Nanoseconds{800});
-  EXPECT_EQ(options.major_sdo_id, 1);
-  EXPECT_EQ(options.log_sync_interval, -3);
-  EXPECT_EQ(options.sync_receipt_timeout, 3);
-  EXPECT_TRUE(options.follow_up_info && options.path_trace && options.assume_two_step);
+  EXPECT_TRUE(options.protocol.peer_to_peer());
+  EXPECT_TRUE(options.protocol.peer_delay_config().capability_needed);
+  EXPECT_EQ(options.protocol.peer_delay_config().highest, Nanoseconds{800});
+  EXPECT_EQ(options.protocol.major_sdo_id, 1);
+  EXPECT_EQ(options.transmitter.log_sync_interval, -3);
+  EXPECT_EQ(options.receiver.sync_receipt_timeout, 3);
+  EXPECT_TRUE(options.transmitter.follow_up_info && options.transmitter.path_trace &&
+              options.protocol.assume_two_step);
   // As ptp4l's asCapable true; and what is set later wins.
   EXPECT_EQ(apply_setting(options, "asCapable", "true").value_or(""), "");
-  EXPECT_FALSE(options.peer_delay_config().capability_needed);
+  EXPECT_FALSE(options.protocol.peer_delay_config().capability_needed);
 }
 
 TEST(Presets, default_profiles_differ_in_the_delay_mechanism_and_ask_nothing_of_a_neighbour) {
   for (const bool peer_to_peer : {false, true}) {
     daemon::PtpOptions options;
     EXPECT_EQ(apply_preset(options, peer_to_peer ? "default-p2p" : "default-e2e").value_or(""), "");
-    EXPECT_EQ(options.peer_to_peer(), peer_to_peer);
-    EXPECT_FALSE(options.peer_delay_config().capability_needed);
+    EXPECT_EQ(options.protocol.peer_to_peer(), peer_to_peer);
+    EXPECT_FALSE(options.protocol.peer_delay_config().capability_needed);
     EXPECT_EQ(options.socket.transport, platform::NetworkTransport::kUdpIpv4);
   }
   daemon::PtpOptions options;
@@ -155,9 +156,9 @@ TEST(Settings, transports_addresses_and_limits_have_ptp4ls_names_and_units) {
   EXPECT_EQ(apply_setting(options, "udp6_scope", "0x05").value_or(""), "");
   EXPECT_EQ(options.socket.ipv6_scope, 5);
   EXPECT_EQ(apply_setting(options, "neighborPropDelayThresh", "1500").value_or(""), "");
-  EXPECT_EQ(options.peer_delay.highest, Nanoseconds{1500});
+  EXPECT_EQ(options.protocol.peer_delay.highest, Nanoseconds{1500});
   EXPECT_EQ(apply_setting(options, "delayAsymmetry", "-40").value_or(""), "");
-  EXPECT_EQ(options.delay_asymmetry, Nanoseconds{-40});
+  EXPECT_EQ(options.receiver.delay_asymmetry, Nanoseconds{-40});
   EXPECT_NE(apply_setting(options, "udp6_scope", "16"), std::nullopt);
   EXPECT_NE(apply_setting(options, "logMinPdelayReqInterval", "8"), std::nullopt);
 }

@@ -41,10 +41,10 @@ std::optional<std::string> ftcs_flag(const PtpArguments& arguments) {
 }
 
 Wrong apply_servo(const PtpArguments& arguments, daemon::PtpOptions& options) {
-  ServoConfig& servo = options.servo;
+  ServoConfig& servo = options.follower.servo;
   if (auto wrong = choose_servo(arguments.steering, servo)) return wrong;
-  if (options.free_running) servo.kind = ServoKind::kFreeRunning;
-  options.epoch = epoch_rules(arguments.epoch);
+  if (options.follower.free_running) servo.kind = ServoKind::kFreeRunning;
+  options.follower.epoch = epoch_rules(arguments.epoch);
   // Debian's ptp4l.conf names it, and its user may never have chosen.
   if (arguments.steering.servo.empty() && servo.kind == ServoKind::kLinuxptpPi) {
     options.notes.emplace_back(
@@ -67,41 +67,43 @@ Wrong apply_servo(const PtpArguments& arguments, daemon::PtpOptions& options) {
     if (!band) return "--converged-band: " + band.error().message;
     servo.ftcs.converged_band = *band;
   }
-  if (auto wrong = apply_steering(arguments.steering, servo, options.steering)) return wrong;
-  if (options.steering.never_step) {
-    if (options.first_step) return "--never-step and --first-step exclude each other";
-    options.first_step_threshold = options.step_threshold = Nanoseconds{0};
+  if (auto wrong = apply_steering(arguments.steering, servo, options.follower.steering))
+    return wrong;
+  if (options.follower.steering.never_step) {
+    if (options.follower.first_step) return "--never-step and --first-step exclude each other";
+    options.follower.first_step_threshold = options.follower.step_threshold = Nanoseconds{0};
   }
-  return check_steering(servo, options.steering);
+  return check_steering(servo, options.follower.steering);
 }
 
 Wrong apply_clock(const PtpArguments& arguments, daemon::PtpOptions& options) {
   const std::string& clock = arguments.clock;
   if (clock == "virtual") {
-    options.clock = daemon::ClockKind::kVirtual;
+    options.clock.kind = daemon::ClockKind::kVirtual;
   } else if (clock == "system") {
-    options.clock = daemon::ClockKind::kSystem;
+    options.clock.kind = daemon::ClockKind::kSystem;
   } else if (clock == "auto") {
-    options.clock = daemon::ClockKind::kAuto;
+    options.clock.kind = daemon::ClockKind::kAuto;
   } else if (clock == "phc" || clock.starts_with("/dev/")) {
-    options.clock = daemon::ClockKind::kPhc;
-    if (clock != "phc") options.clock_device = clock;
+    options.clock.kind = daemon::ClockKind::kPhc;
+    if (clock != "phc") options.clock.device = clock;
   } else {
     return fmt::format("--clock: '{}': expected virtual, system, phc, /dev/ptpN or auto", clock);
   }
-  if (options.clock != daemon::ClockKind::kVirtual) {
+  if (options.clock.kind != daemon::ClockKind::kVirtual) {
     if (options.role == daemon::Role::kTimeTransmitter)
       return "a time transmitter steers no clock: --clock";
     if (!arguments.offset.empty()) return "--offset: only of the virtual clock";
     if (!arguments.skew.empty()) return "--skew: only of the virtual clock";
   }
-  if (auto wrong = set_duration(arguments.offset, "--offset", options.initial_offset)) return wrong;
+  if (auto wrong = set_duration(arguments.offset, "--offset", options.clock.initial_offset))
+    return wrong;
   if (!arguments.skew.empty()) {
     const auto ppb = parse_ppb(arguments.skew);
     if (!ppb) return "--skew: " + ppb.error().message;
-    options.skew_ppb = *ppb;
+    options.clock.skew_ppb = *ppb;
   }
-  options.first_step = arguments.first_step;
+  options.follower.first_step = arguments.first_step;
   return std::nullopt;
 }
 
@@ -110,7 +112,7 @@ Wrong apply_peer(const PtpArguments& arguments, daemon::PtpOptions& options) {
   if (arguments.unicast.empty()) return std::nullopt;
   const NetworkTransport transport = options.socket.transport;
   options.socket.unicast = platform::parse_peer(transport, arguments.unicast);
-  if (options.hybrid) return "--unicast and hybrid_e2e exclude each other";
+  if (options.receiver.hybrid) return "--unicast and hybrid_e2e exclude each other";
   if (options.socket.unicast) return std::nullopt;
   const char* const kind = transport == NetworkTransport::kUdpIpv4   ? "an IPv4"
                            : transport == NetworkTransport::kUdpIpv6 ? "an IPv6"
@@ -122,17 +124,19 @@ Wrong apply_trust(const PtpArguments& arguments, daemon::PtpOptions& options) {
   // Who only receives time by multicast is asked nothing: messages to its own address come from
   // whoever can route a packet here.
   if (options.role == daemon::Role::kTimeReceiver) {
-    options.socket.unicast_messages = options.hybrid ? platform::UnicastMessages::kDelayAnswers
-                                                     : platform::UnicastMessages::kNone;
+    options.socket.unicast_messages = options.receiver.hybrid
+                                          ? platform::UnicastMessages::kDelayAnswers
+                                          : platform::UnicastMessages::kNone;
   }
   for (const std::string& text : arguments.acceptable) {
     const auto identity = parse_clock_identity(text);
     if (!identity) {
       return fmt::format("--acceptable-transmitter: '{}': expected 001122.fffe.334455", text);
     }
-    if (!options.acceptable.add(*identity)) return "--acceptable-transmitter: more than 16 clocks";
+    if (!options.receiver.acceptable.add(*identity))
+      return "--acceptable-transmitter: more than 16 clocks";
   }
-  if (arguments.no_fast_start) options.fast_start = false;
+  if (arguments.no_fast_start) options.receiver.fast_start = false;
   return open_keys(options);
 }
 
@@ -148,7 +152,7 @@ Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) 
   }
   if (arguments.source == "ptp4l") {
     options.source = daemon::Source::kPtp4l;
-    if (!arguments.ptp4l_socket.empty()) options.ptp4l_socket = arguments.ptp4l_socket;
+    if (!arguments.ptp4l_socket.empty()) options.monitor.management = arguments.ptp4l_socket;
     if (options.role == daemon::Role::kTimeTransmitter)
       return "--source: only a time receiver has one";
     return std::nullopt;  // the interface is ptp4l's to know
@@ -164,18 +168,19 @@ Wrong apply_network(const PtpArguments& arguments, daemon::PtpOptions& options) 
 }
 
 Wrong apply_feed(const PtpArguments& arguments, daemon::PtpOptions& options) {
-  options.time_page = arguments.time_page;
-  if (!options.time_page.empty() && options.role == daemon::Role::kTimeTransmitter) {
+  options.feeds.time_page = arguments.time_page;
+  if (!options.feeds.time_page.empty() && options.role == daemon::Role::kTimeTransmitter) {
     return "--time-page: a time transmitter follows nobody";
   }
-  options.chrony_socket = arguments.chrony_socket;
-  options.ntp_shm_unit = arguments.ntp_shm_unit;
-  if (options.chrony_socket.empty() && !options.ntp_shm_unit) return std::nullopt;
-  const char* const flag = options.ntp_shm_unit ? "--ntp-shm" : "--chrony-sock";
+  options.feeds.chrony_socket = arguments.chrony_socket;
+  options.feeds.ntp_shm_unit = arguments.ntp_shm_unit;
+  if (options.feeds.chrony_socket.empty() && !options.feeds.ntp_shm_unit) return std::nullopt;
+  const char* const flag = options.feeds.ntp_shm_unit ? "--ntp-shm" : "--chrony-sock";
   if (options.role == daemon::Role::kTimeTransmitter) {
     return fmt::format("{}: a time transmitter follows nobody", flag);
   }
-  if (options.clock == daemon::ClockKind::kSystem || options.clock == daemon::ClockKind::kAuto) {
+  if (options.clock.kind == daemon::ClockKind::kSystem ||
+      options.clock.kind == daemon::ClockKind::kAuto) {
     return fmt::format(
         "{}: then two programs would steer the system clock; use --clock virtual or "
         "phc",
@@ -214,19 +219,19 @@ Wrong apply_role(const PtpArguments& arguments, daemon::PtpOptions& options) {
 }  // namespace
 
 std::optional<std::string> open_keys(daemon::PtpOptions& options) {
-  const daemon::SecurityOptions& wanted = options.authentication;
+  const daemon::SecurityOptions& wanted = options.protocol.authentication;
   if (!wanted.spp) {
     if (wanted.active_key_id != 0) return "active_key_id needs spp";
     return std::nullopt;  // as for ptp4l: a file that no port names
   }
   if (wanted.sa_file.empty()) return "spp needs sa_file";
   if (wanted.active_key_id == 0) return "spp needs active_key_id, 1 or more";
-  if (options.minor_version == 0)
+  if (options.protocol.minor_version == 0)
     return "spp needs ptp_minor_version 1: IEEE 1588-2008 has no such TLV";
   if (options.source == daemon::Source::kPtp4l)
     return "spp: with --source ptp4l it is ptp4l that authenticates";
-  options.security = std::make_shared<daemon::Security>(wanted);
-  return options.security->load();
+  options.protocol.security = std::make_shared<daemon::Security>(wanted);
+  return options.protocol.security->load();
 }
 
 std::optional<std::string> make_ptp_options(const PtpArguments& arguments,
@@ -260,8 +265,8 @@ void add_ptp_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
-    if (!options.uds_address_given) {
-      options.uds_address = platform::writable_socket_path(daemon::kSocketName);
+    if (!options.management.is_required) {
+      options.management.socket = platform::writable_socket_path(daemon::kSocketName);
     }
     if (const auto wrong =
             confine_to(daemon::rights_of(options), arguments->rights, &options.once_open)) {

@@ -69,7 +69,8 @@ Wrong interval(std::string_view text, std::int8_t& target) { return integer(text
 Wrong set_identity(daemon::PtpOptions& options, std::string_view text) {
   const auto identity = parse_clock_identity(text);
   if (!identity) return fmt::format("'{}': expected 001122.fffe.334455", text);
-  if (*identity != ptp::ClockIdentity{}) options.clock_identity = identity;  // zero: the default
+  if (*identity != ptp::ClockIdentity{})
+    options.protocol.clock_identity = identity;  // zero: the default
   return std::nullopt;
 }
 
@@ -88,7 +89,7 @@ Wrong choose(std::string_view text, Value& target,
 
 Wrong set_delay_mechanism(daemon::PtpOptions& options, std::string_view text) {
   using ptp::DelayMechanism;
-  return choose(text, options.delay_mechanism,
+  return choose(text, options.protocol.delay_mechanism,
                 {{"E2E", DelayMechanism::kEndToEnd}, {"P2P", DelayMechanism::kPeerToPeer}});
 }
 
@@ -107,12 +108,12 @@ Wrong mac(std::string_view text, platform::MacAddress& target) {
 }
 
 Wrong set_capable(daemon::PtpOptions& options, std::string_view text) {
-  return choose(text, options.always_capable, {{"auto", false}, {"true", true}});
+  return choose(text, options.protocol.always_capable, {{"auto", false}, {"true", true}});
 }
 
 Wrong set_clock_servo(daemon::PtpOptions& options, std::string_view text) {
   if (auto wrong = only(text, "pi")) return *wrong + " (--servo knows more)";
-  options.servo.kind = ServoKind::kLinuxptpPi;
+  options.follower.servo.kind = ServoKind::kLinuxptpPi;
   return std::nullopt;
 }
 
@@ -123,13 +124,13 @@ Wrong set_driftfile(daemon::PtpOptions& options, std::string_view text) {
   if (!path.has_filename() || !std::filesystem::is_directory(folder, ignored)) {
     return fmt::format("'{}': expected a file in a folder that exists", text);
   }
-  options.driftfile = text;
+  options.follower.driftfile = text;
   return std::nullopt;
 }
 
 Wrong set_delay_filter(daemon::PtpOptions& options, std::string_view text) {
-  options.delay_filter_given = true;
-  return choose(text, options.servo.two_way.path_delay.filter.kind,
+  options.follower.filter_is_chosen = true;
+  return choose(text, options.follower.servo.two_way.path_delay.filter.kind,
                 {{"moving_median", DelayFilterKind::kMovingMedian},
                  {"moving_minimum", DelayFilterKind::kMovingMinimum},
                  {"steady_mean", DelayFilterKind::kSteadyMean}});
@@ -171,14 +172,14 @@ Wrong set_timeout(daemon::PtpOptions& options, std::string_view text) {
 Wrong set_spp(daemon::PtpOptions& options, std::string_view text) {
   int spp = 0;
   if (auto wrong = integer(text, spp, -1, 255)) return wrong;
-  options.authentication.spp.reset();
-  if (spp >= 0) options.authentication.spp = static_cast<std::uint8_t>(spp);
+  options.protocol.authentication.spp.reset();
+  if (spp >= 0) options.protocol.authentication.spp = static_cast<std::uint8_t>(spp);
   return std::nullopt;
 }
 
 Wrong set_uds_address(daemon::PtpOptions& options, std::string_view text) {
-  options.uds_address = text == "none" ? "" : text;
-  options.uds_address_given = true;
+  options.management.socket = text == "none" ? "" : text;
+  options.management.is_required = true;
   return std::nullopt;
 }
 
@@ -194,40 +195,43 @@ Wrong number_for(Wrong (*set)(double, Target&), std::string_view text, Target& t
   [](daemon::PtpOptions& o, std::string_view v) -> Wrong { return expression; }
 
 constexpr std::array kSettings{
-    PtpSetting{"domainNumber", "PTP domain, 0 to 255", FTCS_SET(integer(v, o.domain, 0, 255))},
+    PtpSetting{"domainNumber", "PTP domain, 0 to 255",
+               FTCS_SET(integer(v, o.protocol.domain, 0, 255))},
     PtpSetting{"transportSpecific", "majorSdoId, 0 to 15",
-               FTCS_SET(integer(v, o.major_sdo_id, 0, 15))},
+               FTCS_SET(integer(v, o.protocol.major_sdo_id, 0, 15))},
     PtpSetting{"ptp_minor_version", "0 (IEEE 1588-2008) or 1",
-               FTCS_SET(integer(v, o.minor_version, 0, 1))},
+               FTCS_SET(integer(v, o.protocol.minor_version, 0, 1))},
     PtpSetting{"logAnnounceInterval", "log2 of seconds, -7 to 7",
-               FTCS_SET(interval(v, o.log_announce_interval))},
+               FTCS_SET(interval(v, o.protocol.log_announce_interval))},
     PtpSetting{"logSyncInterval", "log2 of seconds, -7 to 7",
-               FTCS_SET(interval(v, o.log_sync_interval))},
+               FTCS_SET(interval(v, o.transmitter.log_sync_interval))},
     PtpSetting{"logMinDelayReqInterval", "log2 of seconds, -7 to 7",
-               FTCS_SET(interval(v, o.log_min_delay_req_interval))},
+               FTCS_SET(interval(v, o.protocol.log_min_delay_req_interval))},
     PtpSetting{"announceReceiptTimeout", "announce intervals, 2 to 10",
-               FTCS_SET(integer(v, o.announce_receipt_timeout, 2, 10))},
-    PtpSetting{"priority1", "0 to 255", FTCS_SET(integer(v, o.priority1, 0, 255))},
-    PtpSetting{"priority2", "0 to 255", FTCS_SET(integer(v, o.priority2, 0, 255))},
-    PtpSetting{"clockClass", "0 to 255", FTCS_SET(integer(v, o.quality.clock_class, 0, 255))},
+               FTCS_SET(integer(v, o.receiver.announce_receipt_timeout, 2, 10))},
+    PtpSetting{"priority1", "0 to 255", FTCS_SET(integer(v, o.transmitter.priority1, 0, 255))},
+    PtpSetting{"priority2", "0 to 255", FTCS_SET(integer(v, o.transmitter.priority2, 0, 255))},
+    PtpSetting{"clockClass", "0 to 255",
+               FTCS_SET(integer(v, o.transmitter.quality.clock_class, 0, 255))},
     PtpSetting{"clockAccuracy", "0x00 to 0xFE",
-               FTCS_SET(integer(v, o.quality.clock_accuracy, 0, 0xFE))},
+               FTCS_SET(integer(v, o.transmitter.quality.clock_accuracy, 0, 0xFE))},
     PtpSetting{"offsetScaledLogVariance", "0x0000 to 0xFFFF",
-               FTCS_SET(integer(v, o.quality.offset_scaled_log_variance, 0, 0xFFFF))},
+               FTCS_SET(integer(v, o.transmitter.quality.offset_scaled_log_variance, 0, 0xFFFF))},
     PtpSetting{"utc_offset", "TAI - UTC in seconds",
-               FTCS_SET(integer(v, o.utc_offset, -32768, 32767))},
-    PtpSetting{"timeSource", "0x00 to 0xFF", FTCS_SET(integer(v, o.time_source, 0, 0xFF))},
+               FTCS_SET(integer(v, o.transmitter.utc_offset, -32768, 32767))},
+    PtpSetting{"timeSource", "0x00 to 0xFF",
+               FTCS_SET(integer(v, o.transmitter.time_source, 0, 0xFF))},
     PtpSetting{"clockIdentity", "001122.fffe.334455", set_identity},
     PtpSetting{"slaveOnly", "1: time receiver", set_receiver_only},
     PtpSetting{"clientOnly", "1: time receiver", set_receiver_only},
     PtpSetting{"masterOnly", "1: time transmitter", set_transmitter_only},
     PtpSetting{"serverOnly", "1: time transmitter", set_transmitter_only},
     PtpSetting{"delayAsymmetry", "ns, positive if the way to the receiver is longer",
-               FTCS_SET(nanoseconds(v, o.delay_asymmetry))},
+               FTCS_SET(nanoseconds(v, o.receiver.delay_asymmetry))},
     PtpSetting{"egressLatency", "ns, added to transmit timestamps",
-               FTCS_SET(nanoseconds(v, o.egress_latency))},
+               FTCS_SET(nanoseconds(v, o.protocol.egress_latency))},
     PtpSetting{"ingressLatency", "ns, subtracted from receive timestamps",
-               FTCS_SET(nanoseconds(v, o.ingress_latency))},
+               FTCS_SET(nanoseconds(v, o.protocol.ingress_latency))},
     PtpSetting{"tx_timestamp_timeout", "ms", set_timeout},
     PtpSetting{"udp_ttl", "1 to 255", FTCS_SET(integer(v, o.socket.ttl, 1, 255))},
     PtpSetting{"time_stamping", "hardware or software; default: the best available",
@@ -235,21 +239,22 @@ constexpr std::array kSettings{
     PtpSetting{"network_transport", "UDPv4 (-4), UDPv6 (-6) or L2 (-2)", set_transport},
     PtpSetting{"delay_mechanism", "E2E (-E) or P2P (-P)", set_delay_mechanism},
     PtpSetting{"hybrid_e2e", "1: delay requests go to the transmitter's own address",
-               FTCS_SET(boolean(v, o.hybrid))},
+               FTCS_SET(boolean(v, o.receiver.hybrid))},
     PtpSetting{"logMinPdelayReqInterval", "log2 of seconds, -7 to 7",
-               FTCS_SET(interval(v, o.peer_delay.log_min_interval))},
+               FTCS_SET(interval(v, o.protocol.peer_delay.log_min_interval))},
     PtpSetting{"neighborPropDelayThresh", "ns; above it the neighbour is not 802.1AS capable",
-               FTCS_SET(nanoseconds(v, o.peer_delay.highest))},
+               FTCS_SET(nanoseconds(v, o.protocol.peer_delay.highest))},
     PtpSetting{"min_neighbor_prop_delay", "ns; below it the neighbour is not 802.1AS capable",
-               FTCS_SET(nanoseconds(v, o.peer_delay.lowest))},
+               FTCS_SET(nanoseconds(v, o.protocol.peer_delay.lowest))},
     PtpSetting{"asCapable", "auto or true", set_capable},
     PtpSetting{"syncReceiptTimeout", "Sync intervals, 0 to 10; 0: never",
-               FTCS_SET(integer(v, o.sync_receipt_timeout, 0, 10))},
+               FTCS_SET(integer(v, o.receiver.sync_receipt_timeout, 0, 10))},
     PtpSetting{"assume_two_step", "1: take every Sync for a two-step one",
-               FTCS_SET(boolean(v, o.assume_two_step))},
-    PtpSetting{"follow_up_info", "1: 802.1AS in Follow_Up", FTCS_SET(boolean(v, o.follow_up_info))},
+               FTCS_SET(boolean(v, o.protocol.assume_two_step))},
+    PtpSetting{"follow_up_info", "1: 802.1AS in Follow_Up",
+               FTCS_SET(boolean(v, o.transmitter.follow_up_info))},
     PtpSetting{"path_trace_enabled", "1: transmit the path trace in Announce",
-               FTCS_SET(boolean(v, o.path_trace))},
+               FTCS_SET(boolean(v, o.transmitter.path_trace))},
     PtpSetting{"ptp_dst_mac", "L2: where all but peer delay messages go",
                FTCS_SET(mac(v, o.socket.primary_mac))},
     PtpSetting{"p2p_dst_mac", "L2: where peer delay messages go",
@@ -258,58 +263,62 @@ constexpr std::array kSettings{
                FTCS_SET(integer(v, o.socket.ipv6_scope, 0, 0xF))},
     PtpSetting{"clock_servo", "pi (as --servo linuxptp-pi)", set_clock_servo},
     PtpSetting{"kernel_leap", "1: the kernel makes leap seconds (system clock)",
-               FTCS_SET(boolean(v, o.kernel_leap))},
+               FTCS_SET(boolean(v, o.clock.kernel_leap))},
     PtpSetting{"leapfile", "leap-seconds.list, where Announce has no UTC offset",
-               FTCS_SET((o.leap_file = v, Wrong{}))},
-    PtpSetting{"free_running", "1: measure, do not steer", FTCS_SET(boolean(v, o.free_running))},
-    PtpSetting{"first_step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.first_step_threshold))},
-    PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.step_threshold))},
-    PtpSetting{"max_path_delay", "ns; 0: any", FTCS_SET(nanoseconds(v, o.max_path_delay))},
-    PtpSetting{"max_frequency", "ppb", FTCS_SET(number_for(set_max_frequency, v, o.servo))},
+               FTCS_SET((o.clock.leap_file = v, Wrong{}))},
+    PtpSetting{"free_running", "1: measure, do not steer",
+               FTCS_SET(boolean(v, o.follower.free_running))},
+    PtpSetting{"first_step_threshold", "s; 0: never",
+               FTCS_SET(seconds(v, o.follower.first_step_threshold))},
+    PtpSetting{"step_threshold", "s; 0: never", FTCS_SET(seconds(v, o.follower.step_threshold))},
+    PtpSetting{"max_path_delay", "ns; 0: any", FTCS_SET(nanoseconds(v, o.follower.max_path_delay))},
+    PtpSetting{"max_frequency", "ppb",
+               FTCS_SET(number_for(set_max_frequency, v, o.follower.servo))},
     PtpSetting{"max_frequency_change", "ppb: as --max-frequency-change",
-               FTCS_SET(number_for(set_max_frequency_change, v, o.steering))},
+               FTCS_SET(number_for(set_max_frequency_change, v, o.follower.steering))},
     PtpSetting{"frequency_granularity", "ppb: as --frequency-granularity",
-               FTCS_SET(number_for(set_frequency_granularity, v, o.servo))},
+               FTCS_SET(number_for(set_frequency_granularity, v, o.follower.servo))},
     PtpSetting{"timer_granularity", "ns: as --timer-granularity",
-               FTCS_SET(number_for(set_timer_granularity, v, o.servo))},
+               FTCS_SET(number_for(set_timer_granularity, v, o.follower.servo))},
     PtpSetting{"steering_latency", "ns: as --steering-latency",
-               FTCS_SET(number_for(set_steering_latency, v, o.servo))},
-    PtpSetting{"never_step", "1: as --never-step", FTCS_SET(boolean(v, o.steering.never_step))},
+               FTCS_SET(number_for(set_steering_latency, v, o.follower.servo))},
+    PtpSetting{"never_step", "1: as --never-step",
+               FTCS_SET(boolean(v, o.follower.steering.never_step))},
     PtpSetting{"driftfile", "file that keeps the learnt rate and noise over restarts",
                set_driftfile},
     PtpSetting{"driftfile_interval", "s between two writes; default 3600",
-               FTCS_SET(seconds(v, o.driftfile_interval))},
+               FTCS_SET(seconds(v, o.follower.driftfile_interval))},
     PtpSetting{"delay_filter", "moving_median, moving_minimum or steady_mean", set_delay_filter},
-    PtpSetting{
-        "delay_filter_length", "samples, 1 to 32",
-        FTCS_SET((o.delay_filter_given = true, integer(v, o.servo.two_way.path_delay.filter.length,
-                                                       1, DelayFilter::kCapacity)))},
+    PtpSetting{"delay_filter_length", "samples, 1 to 32",
+               FTCS_SET((o.follower.filter_is_chosen = true,
+                         integer(v, o.follower.servo.two_way.path_delay.filter.length, 1,
+                                 DelayFilter::kCapacity)))},
     PtpSetting{"pi_proportional_const", "ppb per ns; 0: by scale",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_const))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.proportional_const))},
     PtpSetting{"pi_proportional_scale", "0: by time stamping",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_scale))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.proportional_scale))},
     PtpSetting{"pi_proportional_exponent", "of the sync interval",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_exponent, -1e3))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.proportional_exponent, -1e3))},
     PtpSetting{"pi_proportional_norm_max", "greatest gain per sample",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.proportional_norm_max))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.proportional_norm_max))},
     PtpSetting{"pi_integral_const", "ppb per ns; 0: by scale",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_const))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.integral_const))},
     PtpSetting{"pi_integral_scale", "0: by time stamping",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_scale))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.integral_scale))},
     PtpSetting{"pi_integral_exponent", "of the sync interval",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_exponent, -1e3))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.integral_exponent, -1e3))},
     PtpSetting{"pi_integral_norm_max", "greatest gain per sample",
-               FTCS_SET(number(v, o.servo.linuxptp_pi.integral_norm_max))},
+               FTCS_SET(number(v, o.follower.servo.linuxptp_pi.integral_norm_max))},
     PtpSetting{"uds_address", "the management socket, or none; default /var/run/ftcs",
                set_uds_address},
     PtpSetting{"slave_event_monitor",
                "with --source ptp4l: ptp4l's setting of that name; default /var/run/ftcs-monitor",
-               FTCS_SET((o.monitor_socket = v, Wrong{}))},
+               FTCS_SET((o.monitor.stamps = v, Wrong{}))},
     PtpSetting{"sa_file", "file of keys: messages are authenticated (IEEE 1588-2019, 16.14)",
-               FTCS_SET((o.authentication.sa_file = v, Wrong{}))},
+               FTCS_SET((o.protocol.authentication.sa_file = v, Wrong{}))},
     PtpSetting{"spp", "which association of sa_file, 0 to 255; -1: none", set_spp},
     PtpSetting{"active_key_id", "key of what is sent, 1 to 4294967295",
-               FTCS_SET(integer(v, o.authentication.active_key_id, 0, 4'294'967'295))},
+               FTCS_SET(integer(v, o.protocol.authentication.active_key_id, 0, 4'294'967'295))},
     PtpSetting{"logging_level", "0 to 7", FTCS_SET(integer(v, o.log_level, 0, 7))},
     PtpSetting{"summary_interval", "log2 of seconds, -7 to 20",
                FTCS_SET(integer(v, o.summary_interval, -7, 20))},

@@ -95,12 +95,12 @@ TEST(SteeringSettings, have_ptp4ls_units) {
                              "ptp.conf", options)
                 .value_or(""),
             "");
-  EXPECT_NEAR(options.servo.limits.fastest.ppb(), 500'000.0, 1e-3);
-  EXPECT_DOUBLE_EQ(options.steering.largest_rate_change, 2e-6);
-  EXPECT_DOUBLE_EQ(options.servo.adaptive.steering.rate_granularity, 0.5e-9);
-  EXPECT_EQ(options.servo.adaptive.steering.time_granularity, Nanoseconds{1'000'000});
-  EXPECT_EQ(options.servo.adaptive.steering.latency, Nanoseconds{50'000});
-  EXPECT_TRUE(options.steering.never_step);
+  EXPECT_NEAR(options.follower.servo.limits.fastest.ppb(), 500'000.0, 1e-3);
+  EXPECT_DOUBLE_EQ(options.follower.steering.largest_rate_change, 2e-6);
+  EXPECT_DOUBLE_EQ(options.follower.servo.adaptive.steering.rate_granularity, 0.5e-9);
+  EXPECT_EQ(options.follower.servo.adaptive.steering.time_granularity, Nanoseconds{1'000'000});
+  EXPECT_EQ(options.follower.servo.adaptive.steering.latency, Nanoseconds{50'000});
+  EXPECT_TRUE(options.follower.steering.never_step);
 }
 
 TEST(SteeringSettings, a_max_frequency_of_zero_is_the_clocks_own_limit_as_with_ptp4l) {
@@ -108,8 +108,8 @@ TEST(SteeringSettings, a_max_frequency_of_zero_is_the_clocks_own_limit_as_with_p
   EXPECT_EQ(read_config_text("[global]\nmax_frequency 100\nmax_frequency 0\n", "ptp.conf", options),
             std::nullopt);
   // Wider than what is set where nothing is said, so that the clock's own limit alone is left.
-  EXPECT_GT(options.servo.limits.fastest, RateLimits{}.fastest);
-  EXPECT_LT(options.servo.limits.slowest, RateLimits{}.slowest);
+  EXPECT_GT(options.follower.servo.limits.fastest, RateLimits{}.fastest);
+  EXPECT_LT(options.follower.servo.limits.slowest, RateLimits{}.slowest);
 }
 
 TEST(SteeringSettings, errors_name_file_line_and_range) {

@@ -95,7 +95,7 @@ TEST_F(Follower, holdover_because_messages_are_refused_says_that_instead) {
 class PeerToPeerFollower : public Follower {
  protected:
   PeerToPeerFollower() {
-    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+    options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
     follower.emplace(options, log, clock, source.now(), false, "test");
   }
   void sync(std::int64_t link) {
@@ -150,12 +150,12 @@ TEST_F(PeerToPeerFollower,
                ? follower->status(source.now()).last.telemetry.servo.path_delay.ns() - kDelay
                : 0.0;
   };
-  options.servo.kind = ServoKind::kAdaptive;
+  options.follower.servo.kind = ServoKind::kAdaptive;
   EXPECT_NEAR(link_after_six_late(), 0.0, 3.0);
-  options.delay_filter_given = true;
+  options.follower.filter_is_chosen = true;
   EXPECT_NEAR(link_after_six_late(), 10.0, 1e-6) << "the median of ten";
-  options.delay_filter_given = false;
-  options.servo.kind = ServoKind::kFtcs;
+  options.follower.filter_is_chosen = false;
+  options.follower.servo.kind = ServoKind::kFtcs;
   EXPECT_NEAR(link_after_six_late(), 10.0, 1e-6);
 }
 
@@ -334,10 +334,10 @@ TEST_F(NeighbourIsTransmitter, a_filter_that_was_chosen_or_another_servo_is_not_
     return heard();
   };
   EXPECT_GT(heard_after(), 80U);
-  options.delay_filter_given = true;
+  options.follower.filter_is_chosen = true;
   EXPECT_EQ(heard_after(), 0U);
-  options.delay_filter_given = false;
-  options.servo.kind = ServoKind::kFtcs;
+  options.follower.filter_is_chosen = false;
+  options.follower.servo.kind = ServoKind::kFtcs;
   EXPECT_EQ(heard_after(), 0U);
 }
 

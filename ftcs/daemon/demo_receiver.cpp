@@ -39,10 +39,10 @@ std::vector<ServoConfig> demo_servos(const DemoOptions& demo, Nanoseconds interv
 
 ptp::TimeReceiverConfig receiver_config(const PtpOptions& options) {
   ptp::TimeReceiverConfig config;
-  config.port = {*options.clock_identity, 1};
-  config.domain = options.domain;
-  config.log_announce_interval = options.log_announce_interval;
-  config.log_min_delay_req_interval = options.log_min_delay_req_interval;
+  config.port = {*options.protocol.clock_identity, 1};
+  config.domain = options.protocol.domain;
+  config.log_announce_interval = options.protocol.log_announce_interval;
+  config.log_min_delay_req_interval = options.protocol.log_min_delay_req_interval;
   return config;
 }
 
@@ -55,13 +55,13 @@ DemoReceiver::DemoReceiver(platform::Kernel& kernel, const PtpOptions& options,
     : PtpCorePort(kernel, options, log, std::move(timestamps), receiver_config(options)),
       demo_(demo),
       transmitter_(transmitter),
-      truth_{Duration::from_whole_ns(options.start->realtime_ns) -
-             options.start->free_running.since_epoch()},
+      truth_{Duration::from_whole_ns(options.clock.start->realtime_ns) -
+             options.clock.start->free_running.since_epoch()},
       view_(demo.live_view) {
   const auto interval = Nanoseconds{sync_interval(demo).floor_ns()};
   VirtualClockConfig start;
-  start.free_running = options.start->free_running;
-  start.local = LocalTime::from_ns(options.start->realtime_ns) + demo.offset;
+  start.free_running = options.clock.start->free_running;
+  start.local = LocalTime::from_ns(options.clock.start->realtime_ns) + demo.offset;
   start.limits = RateLimits::symmetric_ppb(demo.max_frequency_ppb);
   for (const ServoConfig& servo : demo_servos(demo, interval)) {
     DisciplineConfig discipline;

@@ -58,15 +58,15 @@ class WireWatch {
 PtpOptions quiet(PtpOptions options) {
   options.role = Role::kTimeReceiver;
   options.source = Source::kNetwork;
-  options.clock_device.clear();
+  options.clock.device.clear();
   // In the place of a real clock: whatever the reference shows is followed, and compared with that
   // clock afterwards. A virtual one does what it would do.
-  if (options.clock != ClockKind::kVirtual) options.first_step = true;
-  options.clock = ClockKind::kVirtual;
-  options.driftfile.clear();
-  options.chrony_socket.clear();
-  options.ntp_shm_unit.reset();
-  options.uds_address.clear();
+  if (options.clock.kind != ClockKind::kVirtual) options.follower.first_step = true;
+  options.clock.kind = ClockKind::kVirtual;
+  options.follower.driftfile.clear();
+  options.feeds.chrony_socket.clear();
+  options.feeds.ntp_shm_unit.reset();
+  options.management.socket.clear();
   options.output = Output::kText;
   options.log_level = 0;
   return options;
@@ -123,7 +123,8 @@ const diagnosis::Talker* another(const diagnosis::Talkers& heard, const PtpOptio
     return talker.announces() && talker.count(ptp::MessageType::kSync) > 0 && talker.vlan == 0 &&
            talker.version == ptp::kVersion && talker.to_group &&
            talker.way == static_cast<diagnosis::Way>(options.socket.transport) &&
-           talker.major_sdo_id == options.major_sdo_id && talker.port.clock != followed.clock;
+           talker.major_sdo_id == options.protocol.major_sdo_id &&
+           talker.port.clock != followed.clock;
   });
 }
 
@@ -181,10 +182,10 @@ std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
   const diagnosis::Talker* const other = another(heard, options, *followed);
   if (other == nullptr) return std::nullopt;
   PtpOptions of_other = options;
-  of_other.domain = other->domain;
-  of_other.acceptable = {};
-  (void)of_other.acceptable.add(other->port.clock);
-  of_other.first_step = true;
+  of_other.protocol.domain = other->domain;
+  of_other.receiver.acceptable = {};
+  (void)of_other.receiver.acceptable.add(other->port.clock);
+  of_other.follower.first_step = true;
   auto clocks = open_ptp_clocks(kernel, of_other, log);
   if (!clocks) return std::nullopt;
   PortFacts facts{{own, kPortOfItsOwn - 1}};
@@ -236,8 +237,8 @@ std::optional<Duration> first_offset(platform::Kernel& kernel, const PtpOptions&
   const auto now = device ? device->read_clock() : std::nullopt;
   if (!now) return std::nullopt;
   // The system clock shows UTC.
-  const Duration scale =
-      Duration{std::chrono::seconds{hardware || !port.follows_tai() ? 0 : given.utc_offset}};
+  const Duration scale = Duration{
+      std::chrono::seconds{hardware || !port.follows_tai() ? 0 : given.transmitter.utc_offset}};
   const Duration offset =
       LocalTime::from_ns(*now).since_epoch() + scale - reference.time.since_epoch();
   return abs(offset) > Duration{config.largest_offset} ? std::optional(offset) : std::nullopt;
@@ -260,14 +261,14 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
 }  // namespace
 
 Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
-  const bool steers = given.clock != ClockKind::kVirtual;
-  const bool any_epoch = given.epoch.any_epoch;
+  const bool steers = given.clock.kind != ClockKind::kVirtual;
+  const bool any_epoch = given.follower.epoch.any_epoch;
   const bool adapter_stamps = has_adapter_stamps(kernel, given);
   const PtpOptions options = trial(kernel, given, adapter_stamps);
   Examination result;
   // The hardware clock is looked at even where a trial without its stamps has to do.
-  const bool phc =
-      given.clock == ClockKind::kPhc || (given.clock == ClockKind::kAuto && adapter_stamps);
+  const bool phc = given.clock.kind == ClockKind::kPhc ||
+                   (given.clock.kind == ClockKind::kAuto && adapter_stamps);
   if (auto missing = missing_clock(kernel, given, phc)) {
     result.findings.push_back(std::move(*missing));
     return result;

@@ -20,33 +20,34 @@ constexpr std::size_t kKeptRefusals = 8;
 StepPolicy step_policy(const PtpOptions& options) {
   // ptp4l's servo keeps ptp4l's thresholds; all others are continuous unless a first step is asked
   // for.
-  if (options.servo.kind == ServoKind::kLinuxptpPi) {
-    if (options.step_threshold > Nanoseconds{0}) return {StepMode::kAlways, options.step_threshold};
-    if (options.first_step_threshold > Nanoseconds{0}) {
-      return {StepMode::kFirst, options.first_step_threshold};
+  if (options.follower.servo.kind == ServoKind::kLinuxptpPi) {
+    if (options.follower.step_threshold > Nanoseconds{0})
+      return {StepMode::kAlways, options.follower.step_threshold};
+    if (options.follower.first_step_threshold > Nanoseconds{0}) {
+      return {StepMode::kFirst, options.follower.first_step_threshold};
     }
     return {};
   }
-  if (!options.first_step) return {};
-  return {StepMode::kFirst, options.first_step_threshold};
+  if (!options.follower.first_step) return {};
+  return {StepMode::kFirst, options.follower.first_step_threshold};
 }
 
 /// Empty, with a notice, where the servo has nothing to keep.
 std::string driftfile(const PtpOptions& options, Log& log) {
-  if (options.driftfile.empty() || options.servo.kind == ServoKind::kAdaptive)
-    return options.driftfile;
-  log(LogLevel::kNotice, "driftfile {}: not used, the servo {} keeps no state", options.driftfile,
-      servo_kind_name(options.servo.kind));
+  if (options.follower.driftfile.empty() || options.follower.servo.kind == ServoKind::kAdaptive)
+    return options.follower.driftfile;
+  log(LogLevel::kNotice, "driftfile {}: not used, the servo {} keeps no state",
+      options.follower.driftfile, servo_kind_name(options.follower.servo.kind));
   return {};
 }
 
 /// What makes a learnt rate another clock's.
 std::string clock_name(const PtpOptions& options, bool hardware_stamps) {
-  const char* steered = options.clock == ClockKind::kVirtual  ? "virtual"
-                        : options.clock == ClockKind::kSystem ? "system"
-                                                              : "phc";
+  const char* steered = options.clock.kind == ClockKind::kVirtual  ? "virtual"
+                        : options.clock.kind == ClockKind::kSystem ? "system"
+                                                                   : "phc";
   return fmt::format("{}, {} clock, {} timestamps, skew {} ppb", options.interface, steered,
-                     hardware_stamps ? "hardware" : "software", options.skew_ppb);
+                     hardware_stamps ? "hardware" : "software", options.clock.skew_ppb);
 }
 
 std::string holdover_text(const node::Note& note) {
@@ -76,7 +77,7 @@ std::string foreign_text(const node::Note& note) {
 }  // namespace
 
 StateKeeper state_keeper(const PtpOptions& options, Log& log, bool hardware_stamps) {
-  return {log, driftfile(options, log), options.driftfile_interval,
+  return {log, driftfile(options, log), options.follower.driftfile_interval,
           clock_name(options, hardware_stamps)};
 }
 
@@ -84,19 +85,19 @@ node::ClockFollowerConfig follower_config(const PtpOptions& options, bool hardwa
                                           const std::optional<LearntState>& learnt) {
   node::ClockFollowerConfig follower;
   DisciplineConfig& config = follower.discipline;
-  config.servo = options.servo;
-  config.servo.linuxptp_pi.first_step_threshold = options.first_step_threshold;
-  config.servo.linuxptp_pi.step_threshold = options.step_threshold;
+  config.servo = options.follower.servo;
+  config.servo.linuxptp_pi.first_step_threshold = options.follower.first_step_threshold;
+  config.servo.linuxptp_pi.step_threshold = options.follower.step_threshold;
   config.servo.linuxptp_pi.timestamping =
       hardware_stamps ? TimestampingKind::kHardware : TimestampingKind::kSoftware;
-  config.servo.adaptive.steering.first_step_allowed = options.first_step;
+  config.servo.adaptive.steering.first_step_allowed = options.follower.first_step;
   config.servo.adaptive.learnt = learnt;
   config.step = step_policy(options);
   config.largest_offset = kLargestOffset;
-  config.largest_rate_change = options.steering.largest_rate_change;
-  follower.peer_to_peer = options.peer_to_peer();
-  follower.filter_is_chosen = options.delay_filter_given;
-  follower.largest_path_delay = options.max_path_delay;
+  config.largest_rate_change = options.follower.steering.largest_rate_change;
+  follower.peer_to_peer = options.protocol.peer_to_peer();
+  follower.filter_is_chosen = options.follower.filter_is_chosen;
+  follower.largest_path_delay = options.follower.max_path_delay;
   return follower;
 }
 
@@ -181,13 +182,13 @@ std::optional<std::string> FollowerRecord::add(const node::Note& note) {
            "{}: the offset is {:.3f} s, more than {} s: not followed, {} in a row; set the clock "
            "near the reference{} or allow one step (--first-step)",
            label_, note.offset.seconds(), kLargestOffset.count() / 1e9, note.times,
-           options_.clock == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
+           options_.clock.kind == ClockKind::kVirtual ? " (--offset, 37s if it shows TAI)" : "");
       break;
     case NoteKind::kPathDelayRefused:
       log_(LogLevel::kWarning,
            "{}: the path delay is {:.0f} ns, more than --max-path-delay {} ns: not followed, {} "
            "messages in a row",
-           label_, note.path_delay.ns(), options_.max_path_delay.count(), note.times);
+           label_, note.path_delay.ns(), options_.follower.max_path_delay.count(), note.times);
       break;
     case NoteKind::kSaturated:
       log_(LogLevel::kWarning,

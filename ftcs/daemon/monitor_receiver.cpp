@@ -23,7 +23,7 @@ constexpr Duration kAnswerPatience{std::chrono::seconds{2}};
 constexpr std::uint8_t kPeerToPeer = 2;  // portDS.delayMechanism
 
 PortAddress ptp4l_address(const PtpOptions& options) {
-  return {options.ptp4l_socket, options.domain, options.major_sdo_id};
+  return {options.monitor.management, options.protocol.domain, options.protocol.major_sdo_id};
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ MonitorReceiver::MonitorReceiver(platform::Kernel& kernel, const PtpOptions& opt
       follower_(this->options(), log, clock(), now(), has_hardware_stamps(), "ptp4l", gate()) {}
 
 std::optional<platform::OsError> MonitorReceiver::open_source() {
-  auto socket = platform::LocalSocket::bind(options().monitor_socket);
+  auto socket = platform::LocalSocket::bind(options().monitor.stamps);
   if (!socket) return socket.error();
   socket_.emplace(std::move(*socket));
   transport().watch(socket_->descriptor());
@@ -52,7 +52,7 @@ void MonitorReceiver::start(FreeRunningTime now) {
   last_report_ = now;
   follower_.set_watch(watch());
   log()(LogLevel::kNotice, "following the {} timestamps of a ptp4l with 'slave_event_monitor {}'",
-        has_hardware_stamps() ? "hardware" : "software", options().monitor_socket);
+        has_hardware_stamps() ? "hardware" : "software", options().monitor.stamps);
 }
 
 void MonitorReceiver::wait_until(FreeRunningTime underlying) {
@@ -76,8 +76,8 @@ void MonitorReceiver::housekeeping(FreeRunningTime now) {
   log_lock();
   service().turn(now, follower_.locked(), [this] { return diagnosis::sentence(finding()); });
   publish(now, [this] {
-    WatchState state =
-        watch_state(follower_.discipline(), servo_kind_name(options().servo.kind), finding());
+    WatchState state = watch_state(follower_.discipline(),
+                                   servo_kind_name(options().follower.servo.kind), finding());
     if (source_.transmitter()) state.reference.set(to_text(*source_.transmitter()).view());
     return state;
   });
@@ -87,10 +87,10 @@ diagnosis::Finding MonitorReceiver::finding() const {
   using diagnosis::Cause;
   if (!source_.transmitter() || silent_) {
     return {Cause::kNoAnnounce,
-            fmt::format("no timestamps of a ptp4l come to {}", options().monitor_socket),
+            fmt::format("no timestamps of a ptp4l come to {}", options().monitor.stamps),
             "a ptp4l in the state SLAVE or UNCALIBRATED",
             fmt::format("'slave_event_monitor {}' and 'free_running 1' in its configuration",
-                        options().monitor_socket)};
+                        options().monitor.stamps)};
   }
   const Telemetry& seen = follower_.discipline().latest();
   if (delays_missing_ && !seen.servo.offset_known) {
@@ -118,12 +118,13 @@ void MonitorReceiver::ask_ptp4l(FreeRunningTime now) {
     next_scale_question_ = now + kInterval;
     client_->ask(ptp::ManagementId::kTimePropertiesDataSet);
   }
-  if (options().peer_to_peer() && source_.counters().syncs > 0 && now >= next_link_question_) {
+  if (options().protocol.peer_to_peer() && source_.counters().syncs > 0 &&
+      now >= next_link_question_) {
     next_link_question_ = now + kInterval;
     client_->ask(ptp::ManagementId::kPortDataSet);
   }
   if (waits_for_scale_since_ && now - *waits_for_scale_since_ > kAnswerPatience) {
-    fail("ptp4l does not answer on " + options().ptp4l_socket +
+    fail("ptp4l does not answer on " + options().monitor.management +
          " (--ptp4l-socket), and nothing else says whether its reference shows TAI or UTC");
   }
 }
@@ -197,12 +198,12 @@ void MonitorReceiver::watch_for_silence(FreeRunningTime now) {
         LogLevel::kWarning,
         "nothing from ptp4l for {:.0f} s: is it running, in state SLAVE or UNCALIBRATED, and does "
         "its configuration say 'slave_event_monitor {}' and 'free_running 1'?",
-        kPatience.seconds(), options().monitor_socket);
+        kPatience.seconds(), options().monitor.stamps);
   }
   if (!silent && silent_) log()(LogLevel::kNotice, "ptp4l reports again");
   silent_ = silent;
   const ptp::MonitorCounters& counters = source_.counters();
-  if (!options().peer_to_peer() && !delays_missing_ && counters.delays == 0 &&
+  if (!options().protocol.peer_to_peer() && !delays_missing_ && counters.delays == 0 &&
       counters.syncs >= kSyncsWithoutDelay) {
     delays_missing_ = true;
     log()(LogLevel::kWarning,
@@ -262,11 +263,11 @@ bool complete_by_ptp4l(PtpOptions& options, Log& log) {
       log(LogLevel::kNotice,
           "no ptp4l answers on {} (--ptp4l-socket): taking its timestamps for software ones (-H -i "
           "for hardware)",
-          options.ptp4l_socket);
+          options.monitor.management);
     }
   }
   if (port && port->delay_mechanism == kPeerToPeer) {
-    options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+    options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   }
   if (!options.interface.empty()) return !stop.is_set();
   const bool hardware = options.timestamps == TimestampMode::kHardware;

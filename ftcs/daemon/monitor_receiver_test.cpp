@@ -33,14 +33,14 @@ class MonitorReceiverTest : public testing::Test {
     options.source = Source::kPtp4l;
     options.interface = "eth0";
     options.timestamps = platform::TimestampMode::kSoftware;
-    options.clock = ClockKind::kSystem;
-    options.monitor_socket = (folder / "monitor").string();
-    options.ptp4l_socket = (folder / "ptp4l").string();
-    options.uds_address = "";
+    options.clock.kind = ClockKind::kSystem;
+    options.monitor.stamps = (folder / "monitor").string();
+    options.monitor.management = (folder / "ptp4l").string();
+    options.management.socket = "";
     options.log_level = 3;
     options.duration = Duration::from_ns(60 * kSecond);
     kernel.system.oscillator = 1.0 + 20e-6;
-    ptp4l.emplace(std::move(*LocalSocket::bind(options.ptp4l_socket)));
+    ptp4l.emplace(std::move(*LocalSocket::bind(options.monitor.management)));
     kernel.on_poll = [this] {
       if (on_turn) on_turn();
       answer();
@@ -86,10 +86,10 @@ class MonitorReceiverTest : public testing::Test {
     const double tai = kernel.ideal_ns + 37 * kSecond;
     const auto stamp = [](double ns) { return FakeClocks::kEpoch + std::llround(ns); };
     const std::int64_t local = stamp(kernel.system.time_ns);
-    (void)ptp4l->send(options.monitor_socket,
+    (void)ptp4l->send(options.monitor.stamps,
                       ptp::fake::report(true, sequence, stamp(tai - path), local, transmitter));
-    if (!options.peer_to_peer()) {
-      (void)ptp4l->send(options.monitor_socket,
+    if (!options.protocol.peer_to_peer()) {
+      (void)ptp4l->send(options.monitor.stamps,
                         ptp::fake::report(false, sequence, stamp(tai + path), local, transmitter));
     }
     ++sequence;
@@ -114,7 +114,7 @@ class MonitorReceiverTest : public testing::Test {
 
 TEST_F(MonitorReceiverTest, a_first_step_of_the_clock_is_no_jump_of_the_reference) {
   kernel.system.time_ns = -100 * kSecond;
-  options.first_step = true;
+  options.follower.first_step = true;
   double settled_at_s = 0.0;
   on_turn = [&] {
     if (std::abs(error()) > 1'000.0) settled_at_s = kernel.ideal_ns / kSecond;
@@ -131,7 +131,7 @@ TEST_F(MonitorReceiverTest, an_offset_of_seconds_is_not_followed_where_no_step_i
 }
 
 TEST_F(MonitorReceiverTest, a_utc_offset_that_is_put_right_is_slewed_and_never_stepped) {
-  options.first_step = true;
+  options.follower.first_step = true;
   utc_offset = 36;
   double last = 0.0;
   double largest_move = 0.0;  // in a turn, after the start
@@ -143,7 +143,8 @@ TEST_F(MonitorReceiverTest, a_utc_offset_that_is_put_right_is_slewed_and_never_s
     last = error();
   };
   options.duration = Duration::from_ns(120 * kSecond);
-  options.servo.limits = RateLimits::symmetric_ppb(100e6);  // else a second takes half an hour
+  options.follower.servo.limits =
+      RateLimits::symmetric_ppb(100e6);  // else a second takes half an hour
   EXPECT_EQ(run(), kSuccess);
   EXPECT_NEAR(error(), 0.0, 100.0);
   EXPECT_LT(largest_move, 0.1 * kSecond);
@@ -186,7 +187,7 @@ TEST_F(MonitorReceiverTest, a_step_by_somebody_else_is_counted_and_followed) {
 }
 
 TEST_F(MonitorReceiverTest, peer_to_peer_nothing_is_steered_before_ptp4l_knows_its_link_delay) {
-  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   kernel.system.time_ns = 1e6;
   double error_before = 0.0;
   on_turn = [&] {
@@ -202,7 +203,7 @@ TEST_F(MonitorReceiverTest, peer_to_peer_nothing_is_steered_before_ptp4l_knows_i
 }
 
 TEST_F(MonitorReceiverTest, peer_to_peer_another_transmitter_is_at_the_end_of_another_link) {
-  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   told_link_delay = path;
   double largest = 0.0;
   on_turn = [&] {

@@ -16,8 +16,8 @@ constexpr std::uint16_t kTimeFlags =
 ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::PortState state) {
   ptp::ManagedPort port;
   port.identity = facts.identity;
-  port.domain = options.domain;
-  port.major_sdo_id = options.major_sdo_id;
+  port.domain = options.protocol.domain;
+  port.major_sdo_id = options.protocol.major_sdo_id;
 
   port.description.physical_layer = ptp::PtpText<32>("IEEE 802.3");
   for (std::size_t i = 0; i < facts.address.size(); ++i) {
@@ -33,30 +33,31 @@ ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::
 
   port.default_set.flags = kTwoStep;
   port.default_set.identity = facts.identity.clock;
-  port.default_set.domain = options.domain;
-  port.default_set.priority1 = options.priority1;
-  port.default_set.priority2 = options.priority2;
-  port.default_set.quality = options.quality;
+  port.default_set.domain = options.protocol.domain;
+  port.default_set.priority1 = options.transmitter.priority1;
+  port.default_set.priority2 = options.transmitter.priority2;
+  port.default_set.quality = options.transmitter.quality;
 
   // Nobody above: the clock is its own parent and grandmaster (9.3.5, Table 30).
   port.parent.parent = {facts.identity.clock, 0};
   port.parent.grandmaster = facts.identity.clock;
-  port.parent.grandmaster_quality = options.quality;
-  port.parent.grandmaster_priority1 = options.priority1;
-  port.parent.grandmaster_priority2 = options.priority2;
-  port.time_properties.utc_offset = options.utc_offset;
-  port.time_properties.time_source = options.time_source;
+  port.parent.grandmaster_quality = options.transmitter.quality;
+  port.parent.grandmaster_priority1 = options.transmitter.priority1;
+  port.parent.grandmaster_priority2 = options.transmitter.priority2;
+  port.time_properties.utc_offset = options.transmitter.utc_offset;
+  port.time_properties.time_source = options.transmitter.time_source;
   port.time_status.grandmaster = facts.identity.clock;
 
   port.port.port = facts.identity;
   port.port.state = state;
-  port.port.log_announce_interval = options.log_announce_interval;
-  port.port.announce_receipt_timeout = options.announce_receipt_timeout;
-  port.port.log_sync_interval = options.log_sync_interval;
-  port.port.log_min_delay_req_interval = options.log_min_delay_req_interval;
-  port.port.log_min_pdelay_req_interval = options.peer_delay.log_min_interval;
-  if (options.peer_to_peer()) port.port.delay_mechanism = kPeerToPeer;
-  port.port.version = static_cast<std::uint8_t>(options.minor_version << 4 | ptp::kVersion);
+  port.port.log_announce_interval = options.protocol.log_announce_interval;
+  port.port.announce_receipt_timeout = options.receiver.announce_receipt_timeout;
+  port.port.log_sync_interval = options.transmitter.log_sync_interval;
+  port.port.log_min_delay_req_interval = options.protocol.log_min_delay_req_interval;
+  port.port.log_min_pdelay_req_interval = options.protocol.peer_delay.log_min_interval;
+  if (options.protocol.peer_to_peer()) port.port.delay_mechanism = kPeerToPeer;
+  port.port.version =
+      static_cast<std::uint8_t>(options.protocol.minor_version << 4 | ptp::kVersion);
   port.properties = {facts.identity, state, static_cast<std::uint8_t>(facts.hardware_stamps),
                      ptp::PtpText<32>(options.interface)};
   port.stats.port = facts.identity;
@@ -72,7 +73,7 @@ void set_peer_delay(const ptp::PeerDelay& peer_delay, ptp::ManagedPort& port) {
 ptp::ManagedPort receiver(const PtpOptions& options, const PortFacts& facts, ptp::PortState state) {
   // Nobody (phc2sys, ftcs phc) shall follow the adapter's clock, which runs freely behind a virtual
   // one. ptp4l's word for that, with free_running, is the same.
-  const bool is_free = options.clock == ClockKind::kVirtual && facts.hardware_stamps;
+  const bool is_free = options.clock.kind == ClockKind::kVirtual && facts.hardware_stamps;
   if (is_free && state == ptp::PortState::kTimeReceiver) state = ptp::PortState::kUncalibrated;
   ptp::ManagedPort port = common(options, facts, state);
   port.default_set.flags |= kReceiverOnly;
@@ -163,7 +164,7 @@ ptp::ManagedPort data_sets(const PtpOptions& options, const PortFacts& facts, pt
   port.time_status.grandmaster_present = 1;
   port.time_status.grandmaster = transmitter->clock;
   set_sample(record.status(now), port);
-  if (options.peer_to_peer()) port.port.mean_link_delay = port.current.mean_path_delay;
+  if (options.protocol.peer_to_peer()) port.port.mean_link_delay = port.current.mean_path_delay;
   return port;
 }
 

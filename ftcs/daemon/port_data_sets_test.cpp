@@ -30,7 +30,7 @@ TEST(PortDataSets, only_a_clock_that_is_steered_is_offered_to_those_who_would_fo
         Case{ClockKind::kSystem, false, PortState::kTimeReceiver}}) {
     PtpOptions options;
     options.interface = "eth0";
-    options.clock = kind;
+    options.clock.kind = kind;
     PortFacts facts;
     facts.hardware_stamps = hardware;
     const ClockFollower follower(options, log, clock, source.now(), hardware, "test");

@@ -39,10 +39,10 @@ diagnosis::PortSettings port_settings(const PtpOptions& options) {
   settings.interface = options.interface;
   settings.way = static_cast<diagnosis::Way>(options.socket.transport);
   settings.group = options.socket.primary_mac;
-  settings.domain = options.domain;
-  settings.major_sdo_id = options.major_sdo_id;
-  settings.peer_to_peer = options.peer_to_peer();
-  const ptp::PeerDelayConfig peer = options.peer_delay_config();
+  settings.domain = options.protocol.domain;
+  settings.major_sdo_id = options.protocol.major_sdo_id;
+  settings.peer_to_peer = options.protocol.peer_to_peer();
+  const ptp::PeerDelayConfig peer = options.protocol.peer_delay_config();
   settings.capability_needed = peer.capability_needed;
   settings.lowest_peer_delay = peer.lowest;
   settings.highest_peer_delay = peer.highest;
@@ -55,7 +55,7 @@ PortObserver::PortObserver(const PtpOptions& options, const ptp::ClockIdentity& 
     : settings_(port_settings(options)),
       window_(Duration::from_ns(
           1e9 * std::max(kShortestWindow_s,
-                         kAnnounceIntervals * std::exp2(options.log_announce_interval)))) {
+                         kAnnounceIntervals * std::exp2(options.protocol.log_announce_interval)))) {
   older_.at = newer_.at = start;
   older_.talkers.set_own(own);
   newer_.talkers.set_own(own);

@@ -16,10 +16,10 @@ struct World {
     kernel.timestamping |=
         SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
     options.interface = "eth0";
-    options.clock = ClockKind::kPhc;
+    options.clock.kind = ClockKind::kPhc;
   }
   std::string steered(const char* device) {
-    options.clock_device = device;
+    options.clock.device = device;
     const auto clocks = open_ptp_clocks(kernel, options, log);
     kernel.held_names.clear();
     return clocks ? clocks->real->name() : clocks.error();

@@ -48,89 +48,23 @@ enum class Output : std::uint8_t { kText, kJson, kCsv };
   return servo;
 }
 
-/// Everything that `ftcs ptp` can be told, from the command line or a configuration file. Defaults
-/// are ptp4l's where ptp4l has the option.
-struct PtpOptions {
-  std::string interface;
-  Role role = Role::kTimeReceiver;
-
-  Source source = Source::kNetwork;
-  std::string monitor_socket = "/var/run/ftcs-monitor";  ///< ptp4l's slave_event_monitor
-  std::string ptp4l_socket = "/var/run/ptp4l";           ///< ptp4l's uds_address, to ask it
-
-  platform::PtpSocketConfig socket{};
-  platform::TimestampMode timestamps = platform::TimestampMode::kBestAvailable;
-  Nanoseconds egress_latency{0};
-  Nanoseconds ingress_latency{0};
-
+/// The protocol, as a port of either role speaks it. Defaults are ptp4l's where ptp4l has the
+/// option; so are those of all other parts.
+struct PtpProtocolConfig {
   std::uint8_t domain = 0;
   std::uint8_t major_sdo_id = 0;
   std::uint8_t minor_version = 1;
   std::int8_t log_announce_interval = 1;
-  std::int8_t log_sync_interval = 0;
   std::int8_t log_min_delay_req_interval = 0;
-  std::uint8_t announce_receipt_timeout = 3;
-  std::uint8_t sync_receipt_timeout = 0;
   ptp::DelayMechanism delay_mechanism = ptp::DelayMechanism::kEndToEnd;
   ptp::PeerDelayConfig peer_delay{};
   bool always_capable = false;  ///< ptp4l's asCapable true: ask nothing of the neighbour
-  bool hybrid = false;          ///< ptp4l's hybrid_e2e
   bool assume_two_step = false;
-  bool follow_up_info = false;
-  bool path_trace = false;
-  ptp::AcceptableTransmitters acceptable{};
+  std::optional<ptp::ClockIdentity> clock_identity{};
   SecurityOptions authentication{};
   std::shared_ptr<Security> security{};  ///< opened by `authentication`; null: none
-  bool fast_start = true;
-  std::uint8_t priority1 = 128;
-  std::uint8_t priority2 = 128;
-  ptp::ClockQuality quality{};
-  std::int16_t utc_offset = 37;
-  std::uint8_t time_source = 0xA0;
-  std::optional<ptp::ClockIdentity> clock_identity{};
-  Nanoseconds delay_asymmetry{0};
-
-  ServoConfig servo = ptp_servo_defaults();
-  Nanoseconds max_path_delay{0};    ///< 0: any
-  bool delay_filter_given = false;  ///< by the user: the adaptive servo has a default of its own
-  SteeringRules steering{};
-  node::EpochRules epoch{};
-  ClockKind clock = ClockKind::kVirtual;
-  std::string clock_device{};  ///< kPhc: must be the interface's clock; empty: it is
-  std::string leap_file{};     ///< leap-seconds.list
-  bool kernel_leap = true;     ///< ptp4l's kernel_leap: leap seconds are the kernel's to make
-  bool free_running = false;   ///< ptp4l's free_running: measure, steer nothing
-  bool first_step = false;     ///< step once, whatever the servo
-  std::string driftfile{};     ///< where what the servo learns is kept; empty: nowhere
-  Nanoseconds driftfile_interval{3'600'000'000'000};
-  Nanoseconds first_step_threshold{20'000};
-  Nanoseconds step_threshold{0};
-
-  /// What CLOCK_REALTIME shows at some instant of the oscillator: read at the start unless it is
-  /// given here, so that two processes can stand on one and the same line.
-  std::optional<platform::TimestampClock::RealtimeReading> start{};
-  Duration initial_offset{};  ///< of the virtual clock against CLOCK_REALTIME
-  double skew_ppb = 0.0;      ///< of the virtual clock's oscillator
-
-  /// The management socket; empty: none. Named by the user, it must be had.
-  std::string uds_address;
-  bool uds_address_given = false;
-
-  std::string time_page{};            ///< file for ftcs_now.h; empty: none
-  std::string chrony_socket{};        ///< refclock SOCK of a chronyd; empty: none
-  std::optional<int> ntp_shm_unit{};  ///< NTP's shared memory; none: none
-
-  WatchOptions watch{};  ///< metrics and the live page
-
-  int log_level = 6;         ///< syslog's: 0 emergency to 7 debug
-  int summary_interval = 0;  ///< log2 of seconds
-  Output output = Output::kText;
-  std::optional<Duration> duration{};
-  /// Called when all is open that only root may open; returns what failed.
-  std::function<std::optional<std::string>()> once_open{};
-
-  std::vector<std::string>
-      notes;  ///< settings that mean less here than in ptp4l: logged at the start
+  Nanoseconds egress_latency{0};
+  Nanoseconds ingress_latency{0};
 
   [[nodiscard]] bool peer_to_peer() const {
     return delay_mechanism == ptp::DelayMechanism::kPeerToPeer;
@@ -141,6 +75,105 @@ struct PtpOptions {
     config.capability_needed = peer_to_peer() && major_sdo_id == 1 && !always_capable;
     return config;
   }
+};
+
+/// Whom a time receiver follows, and for how long.
+struct PtpReceiverConfig {
+  std::uint8_t announce_receipt_timeout = 3;
+  std::uint8_t sync_receipt_timeout = 0;
+  bool hybrid = false;  ///< ptp4l's hybrid_e2e
+  ptp::AcceptableTransmitters acceptable{};
+  bool fast_start = true;
+  Nanoseconds delay_asymmetry{0};
+};
+
+/// What a time transmitter says of itself.
+struct PtpTransmitterConfig {
+  std::int8_t log_sync_interval = 0;
+  bool follow_up_info = false;
+  bool path_trace = false;
+  std::uint8_t priority1 = 128;
+  std::uint8_t priority2 = 128;
+  ptp::ClockQuality quality{};
+  std::int16_t utc_offset = 37;
+  std::uint8_t time_source = 0xA0;
+};
+
+/// How a clock is made to follow: servo, rules of steering, and what is kept of it.
+struct PtpFollowerConfig {
+  ServoConfig servo = ptp_servo_defaults();
+  Nanoseconds max_path_delay{0};  ///< 0: any
+  /// Whoever chose the delay filter means it: the adaptive servo has one of its own.
+  bool filter_is_chosen = false;
+  SteeringRules steering{};
+  node::EpochRules epoch{};
+  bool free_running = false;  ///< ptp4l's free_running: measure, steer nothing
+  bool first_step = false;    ///< step once, whatever the servo
+  Nanoseconds first_step_threshold{20'000};
+  Nanoseconds step_threshold{0};
+  std::string driftfile{};  ///< where what the servo learns is kept; empty: nowhere
+  Nanoseconds driftfile_interval{3'600'000'000'000};
+};
+
+/// The clock that is steered.
+struct SteeredClockConfig {
+  ClockKind kind = ClockKind::kVirtual;
+  std::string device{};     ///< kPhc: must be the interface's clock; empty: it is
+  std::string leap_file{};  ///< leap-seconds.list
+  bool kernel_leap = true;  ///< ptp4l's kernel_leap: leap seconds are the kernel's to make
+  /// What CLOCK_REALTIME shows at some instant of the oscillator: read at the start unless it is
+  /// given here, so that two processes can stand on one and the same line.
+  std::optional<platform::TimestampClock::RealtimeReading> start{};
+  Duration initial_offset{};  ///< of the virtual clock against CLOCK_REALTIME
+  double skew_ppb = 0.0;      ///< of the virtual clock's oscillator
+};
+
+/// The sockets of a ptp4l whose stamps are used instead of our own.
+struct MonitorConfig {
+  std::string stamps = "/var/run/ftcs-monitor";  ///< its slave_event_monitor
+  std::string management = "/var/run/ptp4l";     ///< its uds_address, to ask it
+};
+
+/// Our own management socket.
+struct ManagementConfig {
+  std::string socket;        ///< empty: none
+  bool is_required = false;  ///< else a port goes on without it
+};
+
+/// Who is told the time, besides the clock.
+struct FeedConfig {
+  std::string time_page{};            ///< file for ftcs_now.h; empty: none
+  std::string chrony_socket{};        ///< refclock SOCK of a chronyd; empty: none
+  std::optional<int> ntp_shm_unit{};  ///< NTP's shared memory; none: none
+};
+
+/// Everything that `ftcs ptp` can be told, from the command line or a configuration file: the
+/// configurations of its parts, and what the program around them does.
+struct PtpOptions {
+  std::string interface;
+  Role role = Role::kTimeReceiver;
+  Source source = Source::kNetwork;
+  platform::PtpSocketConfig socket{};
+  platform::TimestampMode timestamps = platform::TimestampMode::kBestAvailable;
+
+  PtpProtocolConfig protocol{};
+  PtpReceiverConfig receiver{};
+  PtpTransmitterConfig transmitter{};
+  PtpFollowerConfig follower{};
+  SteeredClockConfig clock{};
+  MonitorConfig monitor{};
+  ManagementConfig management{};
+  FeedConfig feeds{};
+  WatchOptions watch{};  ///< metrics and the live page
+
+  int log_level = 6;         ///< syslog's: 0 emergency to 7 debug
+  int summary_interval = 0;  ///< log2 of seconds
+  Output output = Output::kText;
+  std::optional<Duration> duration{};
+  /// Called when all is open that only root may open; returns what failed.
+  std::function<std::optional<std::string>()> once_open{};
+  /// Settings that mean less here than in ptp4l: logged at the start.
+  std::vector<std::string> notes;
 };
 
 }  // namespace ftcs::daemon

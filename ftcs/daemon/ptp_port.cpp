@@ -18,8 +18,8 @@ VirtualClockConfig clock_config(const PtpOptions& options,
                                 const platform::TimestampClock::RealtimeReading& start) {
   VirtualClockConfig config;
   config.free_running = start.free_running;
-  config.local = LocalTime::from_ns(start.realtime_ns) + options.initial_offset;
-  config.limits = options.servo.limits;
+  config.local = LocalTime::from_ns(start.realtime_ns) + options.clock.initial_offset;
+  config.limits = options.follower.servo.limits;
   return config;
 }
 
@@ -31,8 +31,9 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
       options_(options),
       log_(log),
       timestamps_(std::move(timestamps)),
-      start_(options.start ? *options.start : timestamps_->read_realtime()),
-      oscillator_(timestamps_->source(), Rate::from_ppb(options.skew_ppb), start_.free_running),
+      start_(options.clock.start ? *options.clock.start : timestamps_->read_realtime()),
+      oscillator_(timestamps_->source(), Rate::from_ppb(options.clock.skew_ppb),
+                  start_.free_running),
       virtual_clock_(oscillator_, clock_config(options, start_)),
       real_clock_(real_clock),
       transport_(kernel, options.socket, *timestamps_, *this) {}
@@ -40,7 +41,7 @@ PtpPort::PtpPort(platform::Kernel& kernel, const PtpOptions& options, Log& log,
 int PtpPort::run() {
   const platform::StopFlag stop;
   std::optional<platform::HangupFlag> hangup;
-  if (options_.security) hangup.emplace();
+  if (options_.protocol.security) hangup.emplace();
   return run([this, &stop, &hangup] {
     if (hangup && hangup->take()) read_keys_again();
     return stop.is_set();
@@ -99,16 +100,17 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
 }
 
 void PtpPort::report_keys() {
-  if (!options_.security) return;
-  log_(LogLevel::kNotice, "messages are authenticated: {}", options_.security->description());
-  if (options_.security->is_readable_by_others()) {
+  if (!options_.protocol.security) return;
+  log_(LogLevel::kNotice, "messages are authenticated: {}",
+       options_.protocol.security->description());
+  if (options_.protocol.security->is_readable_by_others()) {
     log_(LogLevel::kWarning, "sa_file {}: everybody may read the keys; expected mode 0600 or 0640",
-         options_.authentication.sa_file);
+         options_.protocol.authentication.sa_file);
   }
 }
 
 void PtpPort::read_keys_again() {
-  if (const auto wrong = options_.security->load()) {
+  if (const auto wrong = options_.protocol.security->load()) {
     log_(LogLevel::kWarning, "{}; the keys before stay in use", *wrong);
   } else {
     report_keys();
@@ -116,8 +118,8 @@ void PtpPort::read_keys_again() {
 }
 
 bool PtpPort::open_time_page() {
-  if (options_.time_page.empty()) return true;
-  auto page = platform::TimePage::open(options_.time_page);
+  if (options_.feeds.time_page.empty()) return true;
+  auto page = platform::TimePage::open(options_.feeds.time_page);
   if (page) {
     publisher_.emplace(std::move(*page));
   } else {
@@ -171,14 +173,14 @@ void PtpPort::feed_others(const FollowerRecord& record) {
 }
 
 bool PtpPort::open_management() {
-  if (options_.uds_address.empty() || managed() == nullptr) return true;
-  auto opened = ManagementServer::open(options_.uds_address);
+  if (options_.management.socket.empty() || managed() == nullptr) return true;
+  auto opened = ManagementServer::open(options_.management.socket);
   if (opened) {
     management_.emplace(std::move(*opened));
     transport_.watch(management_->descriptor());
     return true;
   }
-  if (options_.uds_address_given) {
+  if (options_.management.is_required) {
     log_(LogLevel::kError, "{}", opened.error().message());
     return false;
   }
@@ -270,15 +272,16 @@ void PtpPort::on_message(const platform::ReceivedMessage& message) {
   sender_ = message.sender;
   if (message.channel == ptp::Channel::kGeneral) return on_general(message.bytes, now());
   if (!message.stamp) return;  // counted by the socket
-  const FreeRunningTime received =
-      oscillator_.from_underlying(message.stamp->time) - Duration{options_.ingress_latency};
+  const FreeRunningTime received = oscillator_.from_underlying(message.stamp->time) -
+                                   Duration{options_.protocol.ingress_latency};
   on_event(message.bytes, received, now());
 }
 
 void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
   std::optional<FreeRunningTime> sent;
   if (message.stamp) {
-    sent = oscillator_.from_underlying(message.stamp->time) + Duration{options_.egress_latency};
+    sent = oscillator_.from_underlying(message.stamp->time) +
+           Duration{options_.protocol.egress_latency};
   } else if (!std::exchange(stamp_missed_, true)) {
     log_(LogLevel::kWarning,
          "port 1 ({}): no transmit timestamp within {} ms (tx_timestamp_timeout); one that comes "
@@ -318,7 +321,8 @@ void PtpPort::report_stamps() {
 
 Result<ptp::PortIdentity, platform::OsError> port_identity(platform::Kernel& kernel,
                                                            const PtpOptions& options) {
-  if (options.clock_identity) return ptp::PortIdentity{*options.clock_identity, 1};
+  if (options.protocol.clock_identity)
+    return ptp::PortIdentity{*options.protocol.clock_identity, 1};
   const auto address = platform::identity_address(kernel, options.interface);
   if (!address) return address.error();
   return ptp::PortIdentity{ptp::ClockIdentity::from_mac(*address), 1};

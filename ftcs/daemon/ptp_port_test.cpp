@@ -25,7 +25,8 @@ TEST(PtpPort, missing_transmit_stamps_are_said_once_and_counted) {
   PtpOptions options;
   options.interface = options.socket.interface = "eth0";
   options.timestamps = platform::TimestampMode::kSoftware;
-  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;  // asks once a second by itself
+  options.protocol.delay_mechanism =
+      ptp::DelayMechanism::kPeerToPeer;  // asks once a second by itself
   options.duration = Duration::from_ns(20e9);
   testing::internal::CaptureStdout();
   EXPECT_EQ(run_ptp(kernel, options), kNotLocked);
@@ -43,7 +44,7 @@ struct Link {
   Link() {
     options.interface = options.socket.interface = "eth0";
     options.timestamps = platform::TimestampMode::kSoftware;
-    options.initial_offset = Duration::from_ns(kTai);
+    options.clock.initial_offset = Duration::from_ns(kTai);
     options.duration = Duration::from_ns(60 * kSecond);
   }
   int run() {
@@ -87,7 +88,7 @@ TEST(PtpPort, a_reference_that_jumps_is_followed_or_refused_as_at_the_start_and_
         Case{2 * kSecond, true, kSuccess, "starting anew; the clock is stepped there"},
         Case{2 * kSecond, false, kNotLocked, "more than 1 s is refused (--first-step"}}) {
     Link link;
-    link.options.first_step = expected.first_step;
+    link.options.follower.first_step = expected.first_step;
     link.kernel.on_second = [&] {
       if (link.kernel.ideal_ns > 20 * kSecond) {
         link.kernel.reference_ahead = kTai + expected.jump_ns;

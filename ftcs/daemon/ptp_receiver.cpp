@@ -20,12 +20,12 @@ node::ReceiverNodeConfig receiver_node_config(const PtpOptions& options, const P
   node.follower = follower_config(options, facts.hardware_stamps, learnt);
   ptp::TimeReceiverConfig& config = node.port;
   config = port_config<ptp::TimeReceiverConfig>(options, facts.identity);
-  config.announce_receipt_timeout = options.announce_receipt_timeout;
-  config.hybrid = options.hybrid;
-  config.sync_receipt_timeout = options.sync_receipt_timeout;
-  config.acceptable = options.acceptable;
-  config.fast_start = options.fast_start;
-  config.delay_asymmetry = options.delay_asymmetry;
+  config.announce_receipt_timeout = options.receiver.announce_receipt_timeout;
+  config.hybrid = options.receiver.hybrid;
+  config.sync_receipt_timeout = options.receiver.sync_receipt_timeout;
+  config.acceptable = options.receiver.acceptable;
+  config.fast_start = options.receiver.fast_start;
+  config.delay_asymmetry = options.receiver.delay_asymmetry;
   config.seed = seed;
   config.first_request_id = static_cast<std::uint16_t>(0x1p16 * ptp::Random(seed).uniform());
   config.peer_delay.first_request_id = config.first_request_id;
@@ -152,7 +152,8 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   // Whoever runs for days must not wait for the end to learn this.
   constexpr double kPatienceInAnnounces = 5.0;
   if (!looked_for_missing_ &&
-      seconds_since_start() > kPatienceInAnnounces * std::exp2(options().log_announce_interval)) {
+      seconds_since_start() >
+          kPatienceInAnnounces * std::exp2(options().protocol.log_announce_interval)) {
     looked_for_missing_ = true;
     if (node_.locked() || node_.discipline().path_delay_known()) return;
     log_findings(LogLevel::kWarning);
@@ -194,12 +195,12 @@ diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
 }
 
 WatchState PtpReceiver::watched() {
-  WatchState state = watch_state(node_.discipline(), servo_kind_name(options().servo.kind),
+  WatchState state = watch_state(node_.discipline(), servo_kind_name(options().follower.servo.kind),
                                  diagnosis::diagnose(seen()));
   if (const ptp::TransmitterData* transmitter = node_.port().transmitter()) {
     state.reference.set(to_text(transmitter->announce.grandmaster).view());
   }
-  if (options().security) {
+  if (options().protocol.security) {
     using ptp::Counter;
     const ptp::Counters& count = node_.port().counters();
     state.messages = {.present = true,

@@ -15,14 +15,14 @@ namespace {
 ptp::TimeTransmitterConfig core_config(const PtpOptions& options,
                                        const ptp::PortIdentity& identity) {
   auto config = port_config<ptp::TimeTransmitterConfig>(options, identity);
-  config.log_sync_interval = options.log_sync_interval;
-  config.priority1 = options.priority1;
-  config.priority2 = options.priority2;
-  config.quality = options.quality;
-  config.utc_offset = options.utc_offset;
-  config.time_source = options.time_source;
-  config.follow_up_info = options.follow_up_info;
-  config.path_trace = options.path_trace;
+  config.log_sync_interval = options.transmitter.log_sync_interval;
+  config.priority1 = options.transmitter.priority1;
+  config.priority2 = options.transmitter.priority2;
+  config.quality = options.transmitter.quality;
+  config.utc_offset = options.transmitter.utc_offset;
+  config.time_source = options.transmitter.time_source;
+  config.follow_up_info = options.transmitter.follow_up_info;
+  config.path_trace = options.transmitter.path_trace;
   return config;
 }
 
@@ -47,7 +47,7 @@ void PtpTransmitter::act(const ptp::Action& action) {
   log()(LogLevel::kWarning,
         "port 1 ({}): {} announces itself in domain {} too: receivers follow the better of the two "
         "(priority1, clockClass), and this port goes on",
-        options().interface, to_text(seen->port).view(), options().domain);
+        options().interface, to_text(seen->port).view(), options().protocol.domain);
 }
 
 int PtpTransmitter::finish() {

@@ -50,14 +50,15 @@ Confinement rights_of(const PtpOptions& options) {
   const bool asks_ptp4l = options.source == Source::kPtp4l;
   if (!asks_ptp4l) add_network_rights(rights, options);
   if (asks_ptp4l) rights.capabilities.push_back(CAP_CHOWN);  // a socket that it can answer
-  if (options.clock != ClockKind::kVirtual) {
+  if (options.clock.kind != ClockKind::kVirtual) {
     rights.capabilities.push_back(CAP_SYS_TIME);
     rights.calls.push_back(SystemCalls::kSteering);
   }
-  if (options.ntp_shm_unit) rights.calls.push_back(SystemCalls::kSharedMemory);
-  if (!options.driftfile.empty()) rights.calls.push_back(SystemCalls::kThreads);
-  add_file_rights(rights, !options.driftfile.empty() || !options.chrony_socket.empty() ||
-                              !options.time_page.empty());
+  if (options.feeds.ntp_shm_unit) rights.calls.push_back(SystemCalls::kSharedMemory);
+  if (!options.follower.driftfile.empty()) rights.calls.push_back(SystemCalls::kThreads);
+  add_file_rights(rights, !options.follower.driftfile.empty() ||
+                              !options.feeds.chrony_socket.empty() ||
+                              !options.feeds.time_page.empty());
   add_watch_rights(rights, options.watch);
   return rights;
 }

@@ -159,11 +159,12 @@ class RecordingKernel final : public FakeClocks {
 class Replay {
  public:
   Replay(const PtpOptions& options, const ptp::PortIdentity& identity, std::uint64_t seed)
-      : clock_(source_, {options.start->free_running,
-                         LocalTime::from_ns(options.start->realtime_ns) + options.initial_offset,
-                         Rate{}, options.servo.limits}),
+      : clock_(source_,
+               {options.clock.start->free_running,
+                LocalTime::from_ns(options.clock.start->realtime_ns) + options.clock.initial_offset,
+                Rate{}, options.follower.servo.limits}),
         node_(receiver_node_config(options, {identity, {}, true}, std::nullopt, seed), clock_),
-        start_(options.start->free_running) {
+        start_(options.clock.start->free_running) {
     set(start_);
     node_.start(start_);
     take();
@@ -234,15 +235,15 @@ TEST_P(SameCommands, through_the_daemons_loop_and_in_the_simulator) {
   PtpOptions options;
   options.interface = options.socket.interface = "eth0";
   options.timestamps = platform::TimestampMode::kHardware;
-  options.log_min_delay_req_interval = -3;
-  options.servo.kind = GetParam();
-  options.initial_offset = Duration::from_ns(50e3);
-  options.start = {kernel.adapter(), FakeClocks::kEpoch};
+  options.protocol.log_min_delay_req_interval = -3;
+  options.follower.servo.kind = GetParam();
+  options.clock.initial_offset = Duration::from_ns(50e3);
+  options.clock.start = {kernel.adapter(), FakeClocks::kEpoch};
   options.duration = Duration::from_ns(20e9);
   options.output = Output::kJson;
   options.log_level = 3;
   const ptp::PortIdentity identity{ptp::ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
-  options.clock_identity = identity.clock;
+  options.protocol.clock_identity = identity.clock;
   const auto seed = static_cast<std::uint64_t>(std::llround(kernel.raw));
 
   testing::internal::CaptureStdout();

@@ -85,7 +85,7 @@ TEST(StatusReport, ATimeReceiverThatHearsNobodyKnowsNoOffset) {
 TEST(StatusReport, PeerToPeerThePathDelayIsThatOfTheLink) {
   PtpOptions options;
   options.interface = "eth0";
-  options.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
+  options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   platform::LinuxKernel kernel;
   Log log(kernel, stdout, 0);
   test::ManualSource source;

@@ -37,22 +37,22 @@ TimeFeed::TimeFeed(platform::Kernel& kernel, Log& log, UtcConfig utc)
 Result<TimeFeed, std::string> TimeFeed::open(platform::Kernel& kernel, const PtpOptions& options,
                                              Log& log) {
   UtcConfig utc;
-  utc.utc_offset = options.utc_offset;
-  utc.epoch = options.epoch;
-  const bool wanted = !options.chrony_socket.empty() || options.ntp_shm_unit;
-  if (wanted && !options.leap_file.empty()) {
-    auto list = LeapSeconds::read_file(options.leap_file);
+  utc.utc_offset = options.transmitter.utc_offset;
+  utc.epoch = options.follower.epoch;
+  const bool wanted = !options.feeds.chrony_socket.empty() || options.feeds.ntp_shm_unit;
+  if (wanted && !options.clock.leap_file.empty()) {
+    auto list = LeapSeconds::read_file(options.clock.leap_file);
     if (!list) return list.error();
     utc.leap_seconds = std::move(*list);
   }
   TimeFeed feed(kernel, log, std::move(utc));
-  if (!options.chrony_socket.empty()) {
-    auto socket = platform::ChronySocket::open(options.chrony_socket);
+  if (!options.feeds.chrony_socket.empty()) {
+    auto socket = platform::ChronySocket::open(options.feeds.chrony_socket);
     if (!socket) return "--chrony-sock: " + socket.error().message();
     feed.socket_.emplace(std::move(*socket));
   }
-  if (options.ntp_shm_unit) {
-    auto shm = platform::NtpShm::open(*options.ntp_shm_unit);
+  if (options.feeds.ntp_shm_unit) {
+    auto shm = platform::NtpShm::open(*options.feeds.ntp_shm_unit);
     if (!shm) return "--ntp-shm: " + shm.error().message();
     feed.shm_.emplace(std::move(*shm));
   }

@@ -34,7 +34,7 @@ class Feed : public testing::Test {
  protected:
   Feed() : reader(std::move(*platform::LocalSocket::client())), log(kernel, stdout, 0) {
     options.interface = "eth0";
-    options.chrony_socket = reader.path();
+    options.feeds.chrony_socket = reader.path();
     VirtualClockConfig config;
     config.local = LocalTime::from_ns(kStart);
     clock.emplace(source, config);
@@ -110,12 +110,12 @@ TEST_F(Feed, ASystemClockThatIsBehindHasAPositiveOffsetAndEachSyncIsToldOnce) {
 
 TEST_F(Feed, TaiIsBroughtToUtc) {
   for (const bool vouched_for : {true, false}) {
-    options.utc_offset = vouched_for ? 37 : 40;
+    options.transmitter.utc_offset = vouched_for ? 37 : 40;
     auto feed = TimeFeed::open(kernel, options, log);
     lock();
     exchange();
     announce(*feed, vouched_for ? ptp::flag::kUtcOffsetValid : 0);
-    publish(*feed, -options.utc_offset * kSecond);
+    publish(*feed, -options.transmitter.utc_offset * kSecond);
     const auto sample = read();
     ASSERT_TRUE(sample.has_value());
     EXPECT_NEAR(sample->offset_s, 0.0, 1e-9);
@@ -143,7 +143,7 @@ TEST_F(Feed, AnAnnouncedOffsetThatCannotBeTrueIsNotPassedOn) {
 
 TEST_F(Feed, AnArbitraryTimescaleIsPassedOnOnlyIfThatIsAskedFor) {
   for (const bool allowed : {false, true}) {
-    options.epoch.any_epoch = allowed;
+    options.follower.epoch.any_epoch = allowed;
     auto feed = TimeFeed::open(kernel, options, log);
     lock();
     exchange();
@@ -164,7 +164,7 @@ TEST_F(Feed, AWrongDateIsNotPassedOn) {
 TEST_F(Feed, TheLeapSecondListTellsWhatTheReferenceDoesNot) {
   const std::string path = reader.path() + ".list";
   std::ofstream(path) << 2'272'060'800 << " 33\n" << kMidnight + kFrom1900 << " 34\n";
-  options.leap_file = path;
+  options.clock.leap_file = path;
   auto feed = TimeFeed::open(kernel, options, log);
   ASSERT_TRUE(feed.ok()) << feed.error();
   lock();
@@ -174,16 +174,16 @@ TEST_F(Feed, TheLeapSecondListTellsWhatTheReferenceDoesNot) {
   EXPECT_NEAR(sample->offset_s, 0.0, 1e-9);
   EXPECT_EQ(sample->leap, 1);
   std::filesystem::remove(path);
-  options.leap_file = path;
+  options.clock.leap_file = path;
   EXPECT_FALSE(TimeFeed::open(kernel, options, log).ok());
 }
 
 TEST_F(Feed, WithoutARequestItIsOff) {
-  options.chrony_socket.clear();
+  options.feeds.chrony_socket.clear();
   auto feed = TimeFeed::open(kernel, options, log);
   ASSERT_TRUE(feed.ok());
   EXPECT_FALSE(feed->is_on());
-  options.chrony_socket = std::string(300, 'x');
+  options.feeds.chrony_socket = std::string(300, 'x');
   EXPECT_FALSE(TimeFeed::open(kernel, options, log).ok());
 }
 

@@ -30,15 +30,15 @@ class WrongEpoch : public testing::Test {
         SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
     kernel.phc.time_ns = kTai;
     ptp.interface = ptp.socket.interface = "eth0";
-    ptp.uds_address.clear();
+    ptp.management.socket.clear();
     ptp.duration = phc.duration = Duration::from_ns(30 * kSecond);
     ptp.log_level = 5;
-    ptp.epoch.earliest_utc_s = phc.epoch.earliest_utc_s = kBuilt;
+    ptp.follower.epoch.earliest_utc_s = phc.epoch.earliest_utc_s = kBuilt;
     phc.source = "/dev/ptp0";
     phc.sink_ahead_s = -37;
   }
   void choose(ClockKind clock) {
-    ptp.clock = clock;
+    ptp.clock.kind = clock;
     ptp.timestamps = clock == ClockKind::kSystem ? platform::TimestampMode::kSoftware
                                                  : platform::TimestampMode::kHardware;
   }
@@ -80,8 +80,8 @@ TEST_F(WrongEpoch, a_transmitter_at_1970_moves_neither_clock) {
   for (const ClockKind clock : {ClockKind::kSystem, ClockKind::kPhc}) {
     for (const ServoKind servo : {ServoKind::kAdaptive, ServoKind::kLinuxptpPi}) {
       choose(clock);
-      ptp.servo.kind = servo;
-      ptp.first_step = servo == ServoKind::kAdaptive;
+      ptp.follower.servo.kind = servo;
+      ptp.follower.first_step = servo == ServoKind::kAdaptive;
       kernel.reference_ahead = k1970;
       expect_refused(follow_network(), "the reference shows 1970-01-01");
     }
@@ -115,7 +115,7 @@ TEST_F(WrongEpoch, a_system_clock_that_was_never_set_moves_no_adapters_clock) {
 TEST_F(WrongEpoch, a_date_two_days_away_moves_no_clock) {
   constexpr double kTwoDays = 2 * 86'400 * kSecond;
   choose(ClockKind::kSystem);
-  ptp.first_step = true;
+  ptp.follower.first_step = true;
   kernel.reference_ahead = kTai + kTwoDays;
   expect_refused(follow_network(), "from the system clock");
   kernel.phc.time_ns = kTai + kTwoDays;
@@ -124,8 +124,8 @@ TEST_F(WrongEpoch, a_date_two_days_away_moves_no_clock) {
 
 TEST_F(WrongEpoch, what_was_asked_for_is_followed) {
   choose(ClockKind::kPhc);
-  ptp.epoch.any_epoch = true;
-  ptp.first_step = true;
+  ptp.follower.epoch.any_epoch = true;
+  ptp.follower.first_step = true;
   kernel.flags = 0;
   kernel.reference_ahead = k1970;
   EXPECT_EQ(follow_network(), kSuccess) << errors;
@@ -145,7 +145,7 @@ TEST_F(WrongEpoch, a_plausible_reference_is_followed) {
 // A board without a battery: its clock starts in 1970, and the reference is there to set it.
 TEST_F(WrongEpoch, a_system_clock_that_starts_in_1970_is_set) {
   choose(ClockKind::kSystem);
-  ptp.first_step = true;
+  ptp.follower.first_step = true;
   kernel.system.time_ns = k1970;
   EXPECT_EQ(follow_network(), kSuccess) << errors;
   EXPECT_NEAR(kernel.system.time_ns - kernel.ideal_ns, 0.0, 1'000.0);
@@ -155,8 +155,8 @@ TEST_F(WrongEpoch, a_system_clock_that_starts_in_1970_is_set) {
 TEST_F(WrongEpoch, a_wrong_date_in_mid_run_is_not_followed_and_left_when_it_is_gone) {
   for (const bool to_system : {true, false}) {
     choose(to_system ? ClockKind::kSystem : ClockKind::kPhc);
-    ptp.servo.kind = ServoKind::kLinuxptpPi;
-    ptp.step_threshold = Nanoseconds{1'000};  // even if it may step at any time
+    ptp.follower.servo.kind = ServoKind::kLinuxptpPi;
+    ptp.follower.step_threshold = Nanoseconds{1'000};  // even if it may step at any time
     ptp.duration = Duration::from_ns(60 * kSecond);
     const double start = kernel.ideal_ns;
     double largest = 0.0;

@@ -18,18 +18,19 @@ constexpr int kWarningsOnly = 4;
 PtpOptions plant_options(PtpOptions options) {
   options.role = Role::kTimeReceiver;
   options.source = Source::kNetwork;
-  options.clock = ClockKind::kVirtual;
-  options.first_step = true;  // before the first cycle; nobody acts on that clock yet
+  options.clock.kind = ClockKind::kVirtual;
+  options.follower.first_step = true;  // before the first cycle; nobody acts on that clock yet
   // A configuration file may be that of a service, whose these are.
-  options.uds_address.clear();
-  options.driftfile.clear();
-  options.chrony_socket.clear();
-  options.ntp_shm_unit.reset();
+  options.management.socket.clear();
+  options.follower.driftfile.clear();
+  options.feeds.chrony_socket.clear();
+  options.feeds.ntp_shm_unit.reset();
   options.output = Output::kText;
   options.duration.reset();
   options.socket.interface = options.interface;
-  options.socket.unicast_messages =
-      options.hybrid ? platform::UnicastMessages::kDelayAnswers : platform::UnicastMessages::kNone;
+  options.socket.unicast_messages = options.receiver.hybrid
+                                        ? platform::UnicastMessages::kDelayAnswers
+                                        : platform::UnicastMessages::kNone;
   return options;
 }
 

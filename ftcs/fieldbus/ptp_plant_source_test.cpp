@@ -24,7 +24,7 @@ PtpOptions on_eth0() {
 struct Receiver {
   explicit Receiver(platform::FakeClocks& kernel, double seconds)
       : log(kernel, stderr, 3), options(on_eth0()) {
-    options.first_step = true;
+    options.follower.first_step = true;
     options.duration = Duration::from_ns(seconds * kSecond);
     auto clocks = open_ptp_clocks(kernel, options, log);
     const auto facts = port_facts(kernel, options, *clocks);
@@ -86,14 +86,14 @@ TEST(PtpPlantSource, follows_in_a_thread_of_its_own_and_ends_with_it) {
 TEST(PtpPlantSource, leaves_the_driftfile_of_its_configuration_to_whose_it_is) {
   NetworkKernel kernel;
   PtpOptions options = on_eth0();
-  options.driftfile = testing::TempDir() + "ftcs-plant-driftfile";
-  std::filesystem::remove(options.driftfile);
+  options.follower.driftfile = testing::TempDir() + "ftcs-plant-driftfile";
+  std::filesystem::remove(options.follower.driftfile);
   auto source = PtpPlantSource::start(kernel, options);
   ASSERT_TRUE(source) << source.error();
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds{20};
   while (!(*source)->read({}) && std::chrono::steady_clock::now() < give_up) continue;
   source->reset();
-  EXPECT_FALSE(std::filesystem::exists(options.driftfile));
+  EXPECT_FALSE(std::filesystem::exists(options.follower.driftfile));
 }
 
 TEST(PtpPlantSource, without_the_interface_says_why_at_once) {

@@ -17,6 +17,7 @@ Result<ChildProcess, OsError> ChildProcess::start(const std::function<int()>& bo
   const pid_t pid = fork();
   if (pid < 0) return os_error(errno, "starting a second process");
   if (pid > 0) return ChildProcess(pid);
+  (void)setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(0);  // it died before the line above
   const int code = body();

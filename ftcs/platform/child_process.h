@@ -12,6 +12,8 @@ namespace ftcs::platform {
 
 /// A copy of this program that runs one function and ends with its result; told to stop (SIGTERM)
 /// and waited for when this goes out of scope, and by the kernel should the parent die first.
+/// In a process group of its own: Ctrl-C at a terminal goes to a group, and only the parent must
+/// hear it, which would find its child dead and call that an error else.
 class ChildProcess {
  public:
   [[nodiscard]] static Result<ChildProcess, OsError> start(const std::function<int()>& body);

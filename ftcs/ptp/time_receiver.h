@@ -193,7 +193,7 @@ class TimeReceiver {
   TransmitterData transmitter_{};
   std::optional<Duration> sync_interval_;
   SyncMatcher matcher_;
-  SequenceWindow sequence_window_;                ///< of Sync and Follow_Up
+  SequenceWindow sequence_window_;  ///< of Sync and Follow_Up
   DelayRequests delay_requests_;
   ReferenceWatch reference_;
   std::optional<Duration> untold_jump_{};  ///< found while none was selected
