@@ -50,7 +50,8 @@ struct ServoTraits {
 /// Completes each message with what the steered clock showed, asks the servo, applies step policy
 /// and limits, and hands the command to the clock. The clock itself ends a correction after T_c
 /// (AdjustableClock), so that a lost message does no harm. Counts and reports; decides nothing
-/// about frequency or offset.
+/// about frequency or offset. What is asked of every message, whatever the servo, is asked here: is
+/// it news (in_order.h), how long is the interval, is this an outage.
 ///
 /// A command passes, in this order:
 ///

@@ -97,10 +97,12 @@ concept ControlLaw = std::is_trivially_copyable_v<S> &&
 /// Everything above a servo (BasicClockDiscipline, the nodes) takes any type of this concept.
 ///
 /// Pairs come as they become known: backward ones later than forward ones that were sent after
-/// them, both directions at any ratio, none for any time. A servo states its verdict on each, and
+/// them, both directions at any ratio, none for any time. Each is news for its direction: who has
+/// no discipline asks that by InOrder (in_order.h). A servo states its verdict on each, and
 /// mostly commands on forward ones; the adaptive servo commands on both.
 ///
-/// Optional: on_step(step), as above; snapshot_at(now), what it believes at a later moment, with
+/// Optional: on_step(step), as above; on_new_epoch(), a clock was set back, and what was measured
+/// before is void (without it: reset()); snapshot_at(now), what it believes at a later moment, with
 /// the deviation grown until then; free_path_delay(sigma_ns), the delay that was given is to be
 /// estimated from now on.
 template <class S>

@@ -33,17 +33,15 @@ struct TwoWayConfig {
 ///     innovation = t1_a + r (t2 - t2_a) - t1        r: rate ratio of the last forward messages,
 ///                                                   a: last accepted message; positive: late
 ///
-/// A forward message passes, in this order:
+/// A forward message, which is news (in_order.h), passes in this order:
 ///
-///     is it news     newer than the last one on one clock at least, else kDuplicate
 ///     the gate       once two messages have told the rate; kRejected, or the row's last: exit
 ///     path delay     becomes the partner of backward messages near to it
 ///     the law        origin, path delay, local and free-running stamp, as one SyncSample
 ///
 /// The law is silent until a path delay is known: given, or measured by one exchange. Its first
 /// sample may then be the message before (prime()), so that FTCS commands with the first exchange
-/// and one more Sync. Whether the message is a duplicate or impossible by its interval, the law
-/// judges again by its own rules.
+/// and one more Sync. Whether its interval is possible the law judges.
 ///
 ///     TwoWayServo<FtcsServo> servo({.fixed_path_delay = 10us}, {.offset_gain = 1.0 / 8.0});
 template <ControlLaw Law>
@@ -54,8 +52,8 @@ class TwoWayServo {
       : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
 
   /// Messages come in order (in_order.h). Forward: the law's verdict and command; kRejected by the
-  /// gate. Backward: never a command; kImplausible where the
-  /// path delay it tells is impossible (PathDelayConfig), kUsed for any other, even without a use.
+  /// gate. Backward: never a command; kImplausible where the path delay it tells is impossible
+  /// (PathDelayConfig), kUsed for any other, even without a use.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept {
     return pair.direction == Direction::kForward ? on_forward(pair, now) : on_backward(pair);
   }

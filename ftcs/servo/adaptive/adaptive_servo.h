@@ -73,13 +73,11 @@ class BasicAdaptiveServo {
   /// Valid: validate(config) finds nothing; it is not asked here.
   explicit BasicAdaptiveServo(const AdaptiveConfig& config = {}) noexcept;
 
-  /// One pair of either direction, in the order in which they become known.
+  /// One pair of either direction, in the order in which they become known; news (in_order.h).
   ///
   /// kUsed, or kRejected where the message is an outlier with more than half a chance; both may
-  /// carry a command, since the estimate goes on. kDuplicate: newer than the last one of its
-  /// direction on neither clock. kImplausible: newer on one clock alone. Three refused ones that
-  /// advance among themselves are a new epoch, and all is learnt anew. A rate that is half or more
-  /// off nominal commands nothing.
+  /// carry a command, since the estimate goes on. A rate that is half or more off nominal commands
+  /// nothing.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept;
   /// Another reference: everything measured is void, a learnt state included; the fixed path delay
   /// holds again, and the first command may step again.
