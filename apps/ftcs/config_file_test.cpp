@@ -77,7 +77,7 @@ TEST(ConfigFile, delay_filters_are_ptp4ls_and_one_more) {
   EXPECT_EQ(kind("moving_median"), DelayFilterKind::kMovingMedian);
   EXPECT_EQ(kind("moving_minimum"), DelayFilterKind::kMovingMinimum);
   EXPECT_EQ(kind("steady_mean"), DelayFilterKind::kSteadyMean);
-  EXPECT_FALSE(options_of("[global]\n").delay_filter_given);
+  EXPECT_FALSE(options_of("[global]\n").follower.filter_is_chosen);
 }
 
 TEST(ConfigFile, both_spellings_of_the_roles_are_known) {
