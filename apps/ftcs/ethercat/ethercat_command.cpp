@@ -23,7 +23,6 @@
 #include "ftcs/fieldbus/run_status.h"
 
 namespace ftcs::app {
-
 namespace {
 
 struct EthercatArguments {
