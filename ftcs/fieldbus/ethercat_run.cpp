@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -191,6 +193,26 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
 }
 
 }  // namespace
+
+std::optional<std::string> check_drive_sync(const RunOptions& options) {
+  const Nanoseconds cycle = options.servo.cycle;
+  for (std::size_t n = 0; n < options.drive_sync.size(); ++n) {
+    const ethercat::DriveSync& sync = options.drive_sync[n];
+    if (sync.sync0_shift <= -cycle || sync.sync0_shift >= cycle) {
+      return fmt::format("--sync0-shift: drive {}: {} ns is a cycle or more", n,
+                         sync.sync0_shift.count());
+    }
+    if (sync.sync1_shift < Nanoseconds{0} || sync.sync1_shift >= cycle) {
+      return fmt::format("--sync1: drive {}: {} ns is not from zero to below a cycle", n,
+                         sync.sync1_shift.count());
+    }
+    if (sync.sync1_register(cycle) > std::numeric_limits<std::uint32_t>::max()) {
+      return fmt::format("--sync1: drive {}: {} cycles are longer than the 4.29 s of a register", n,
+                         sync.sync1_cycles);
+    }
+  }
+  return std::nullopt;
+}
 
 int scan_ethercat(platform::Kernel& kernel, const RunOptions& options) {
   return with_runner(kernel, options, run_scan);

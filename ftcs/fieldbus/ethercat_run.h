@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "ftcs/fieldbus/run_options.h"
 #include "ftcs/platform/kernel.h"
 
@@ -12,5 +15,9 @@ namespace ftcs::daemon {
 /// `ftcs ethercat run`: plant time, drives, cycles, figures and files. Can the files of the options
 /// be written, is asked before.
 [[nodiscard]] int run_ethercat(platform::Kernel& kernel, const RunOptions& options);
+
+/// Shifts of SYNC0 and SYNC1 are within a cycle, which is known when all options are; one sentence
+/// if one is not.
+[[nodiscard]] std::optional<std::string> check_drive_sync(const RunOptions& options);
 
 }  // namespace ftcs::daemon

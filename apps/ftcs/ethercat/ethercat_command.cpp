@@ -99,27 +99,6 @@ void read_drive_sync(const char* flag, const std::string& text, bool sync1,
   sync.sync1_cycles = static_cast<std::uint16_t>(*cycles);
 }
 
-/// Shifts are within a cycle, which is known at the end alone.
-std::optional<std::string> check_drive_sync(const daemon::RunOptions& options) {
-  const Nanoseconds cycle = options.servo.cycle;
-  for (std::size_t n = 0; n < options.drive_sync.size(); ++n) {
-    const ethercat::DriveSync& sync = options.drive_sync[n];
-    if (sync.sync0_shift <= -cycle || sync.sync0_shift >= cycle) {
-      return fmt::format("--sync0-shift: drive {}: {} ns is a cycle or more", n,
-                         sync.sync0_shift.count());
-    }
-    if (sync.sync1_shift < Nanoseconds{0} || sync.sync1_shift >= cycle) {
-      return fmt::format("--sync1: drive {}: {} ns is not from zero to below a cycle", n,
-                         sync.sync1_shift.count());
-    }
-    if (sync.sync1_register(cycle) > std::numeric_limits<std::uint32_t>::max()) {
-      return fmt::format("--sync1: drive {}: {} cycles are longer than the 4.29 s of a register", n,
-                         sync.sync1_cycles);
-    }
-  }
-  return std::nullopt;
-}
-
 /// "bridge" or "bridge:POSITION": plant time is not a clock of this host.
 std::optional<std::string> read_bridge(daemon::RunOptions& options) {
   constexpr std::string_view kName = "bridge";
@@ -185,7 +164,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   }
   if (auto wrong = read_bridge(options)) return wrong;
   if (auto wrong = open_keys(options.ptp)) return "--ptp-config: " + *wrong;
-  if (auto wrong = check_drive_sync(options)) return wrong;
+  if (auto wrong = daemon::check_drive_sync(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || !(arguments.gains[0] >= 0.0 && arguments.gains[1] >= 0.0)) {
     return "--gains: two numbers, as in 1,1";
