@@ -28,7 +28,8 @@ ServoConfig limited(const DisciplineConfig& config, const RateLimits& limits) no
 bool has_fixed_delay(const ServoConfig& servo) noexcept {
   return servo.two_way.fixed_path_delay ||
          (servo.kind == ServoKind::kAdaptive && servo.adaptive.fixed_path_delay) ||
-         (servo.kind == ServoKind::kKalman && servo.kalman.fixed_path_delay);
+         (servo.kind == ServoKind::kKalman && servo.kalman.fixed_path_delay) ||
+         (servo.kind == ServoKind::kMinimumDelay && servo.minimum_delay.fixed_path_delay);
 }
 
 ServoTraits traits_of(const ServoConfig& servo) noexcept {

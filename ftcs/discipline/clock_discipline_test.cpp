@@ -509,6 +509,19 @@ TEST_F(ClockDisciplineTest, without_a_measured_path_delay_it_steers_but_is_not_l
   EXPECT_FALSE(telemetry.locked) << "another reference has another path";
 }
 
+TEST_F(ClockDisciplineTest, a_path_delay_that_is_given_to_the_servo_itself_is_known) {
+  for (const ServoKind kind :
+       {ServoKind::kAdaptive, ServoKind::kKalman, ServoKind::kMinimumDelay}) {
+    DisciplineConfig config = config_for(kind);
+    config.servo.two_way.fixed_path_delay.reset();
+    config.servo.adaptive.fixed_path_delay = 0ns;
+    config.servo.kalman.fixed_path_delay = 0ns;
+    config.servo.minimum_delay.fixed_path_delay = 0ns;
+    start(Nanoseconds{0}, config);
+    EXPECT_TRUE(discipline_->path_delay_known()) << servo_kind_name(kind);
+  }
+}
+
 TEST_F(ClockDisciplineTest, a_jump_of_the_reference_beyond_the_bound_is_a_beginning) {
   for (const bool may_step : {false, true}) {
     DisciplineConfig config = config_for(ServoKind::kFtcs);
