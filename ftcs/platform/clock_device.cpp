@@ -150,6 +150,17 @@ std::optional<OsError> ClockDevice::hold() {
   return std::nullopt;
 }
 
+// The one that follows is held already: whoever has the same two can only be the other way round.
+std::optional<Descriptor> ClockDevice::hold_pair_with(const ClockDevice& other) {
+  const std::string ours = identity();
+  const std::string theirs = other.identity();
+  if (ours.empty() || theirs.empty()) return Descriptor{};
+  const std::string pair = "ftcs pair " + std::min(ours, theirs) + " " + std::max(ours, theirs);
+  const int held = kernel_->hold_name(pair.c_str());
+  if (held == -EADDRINUSE) return std::nullopt;
+  return held >= 0 ? Descriptor(*kernel_, held) : Descriptor{};
+}
+
 std::string ClockDevice::identity() const {
   if (is_system()) return "realtime";
   if (number_ <= 0) return {};

@@ -63,6 +63,9 @@ class ClockDevice {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   /// Another name, or another node of the same device, is no other clock.
   [[nodiscard]] bool is_same_clock(const ClockDevice& other) const;
+  /// For a program that has this clock follow the other: no value while another one of ours has
+  /// them follow each other the other way round. To be kept.
+  [[nodiscard]] std::optional<Descriptor> hold_pair_with(const ClockDevice& other);
   /// Of a hardware clock: for the ioctls of <linux/ptp_clock.h>.
   [[nodiscard]] int descriptor() const noexcept { return device_.get(); }
   [[nodiscard]] Kernel& kernel() noexcept { return *kernel_; }

@@ -77,6 +77,14 @@ Result<std::unique_ptr<PhcRunner>, std::string> PhcRunner::open(platform::Kernel
   if (!device) return device.error().message();
   auto comparison = ClockComparison::make(kernel, *source, *device);
   if (!comparison) return comparison.error();
+  platform::Descriptor pair;
+  if (!options.free_running) {
+    auto held = device->hold_pair_with(*source);
+    if (!held)
+      return source->name() + " follows " + device->name() +
+             " already: two clocks that follow each other run away together";
+    pair = std::move(*held);
+  }
   const std::string name = device->name();
   utc->reference_is_utc = source->is_system();
   const RateLimits limits = steering_limits(*device, options.servo.limits);
@@ -85,7 +93,8 @@ Result<std::unique_ptr<PhcRunner>, std::string> PhcRunner::open(platform::Kernel
   auto sink = std::make_unique<RealClock>(kernel, log, std::move(clock), std::move(*utc));
   // Not make_unique: the constructor is private.
   return std::unique_ptr<PhcRunner>(new PhcRunner(
-      kernel, options, log, {std::move(*source), std::move(sink), std::move(*comparison)}));
+      kernel, options, log,
+      {std::move(*source), std::move(sink), std::move(*comparison), std::move(pair)}));
 }
 
 PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks)
@@ -95,6 +104,7 @@ PhcRunner::PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& l
       source_(std::move(clocks.source)),
       sink_(std::move(clocks.sink)),
       comparison_(std::move(clocks.comparison)),
+      pair_(std::move(clocks.pair)),
       follower_(follower_config(options), sink_->clock()) {
   // With -O the sink shows the source's time plus a constant; else the source is TAI.
   if (options.sink_ahead_s) {

@@ -50,6 +50,7 @@ class PhcRunner {
     platform::ClockDevice source;
     std::unique_ptr<RealClock> sink;
     ClockComparison comparison;
+    platform::Descriptor pair;
   };
   PhcRunner(platform::Kernel& kernel, const PhcOptions& options, Log& log, Clocks clocks);
 
@@ -75,6 +76,7 @@ class PhcRunner {
   platform::ClockDevice source_;
   std::unique_ptr<RealClock> sink_;
   ClockComparison comparison_;
+  platform::Descriptor pair_;  // held, so that the two do not follow each other
   ReadingMessages messages_;
   Duration half_width_{};  ///< of the last comparison: what an asymmetry of it may hide
   node::ClockFollower follower_;
