@@ -32,12 +32,33 @@ void ftcs_addend_reset(ftcs_addend_servo* servo) {
 
 /* ---- what the clock did ---- */
 
-int64_t ftcs_addend_bend(const ftcs_addend_servo* s, int64_t local_ns, uint16_t fraction) {
-  const int64_t rest = ftcs_addend_difference(s->until_ns, local_ns) - fraction;
-  if (rest <= 0 && ftcs_addend_timed(s->config) != 0) return 0;
-  return ftcs_addend_times(rest, (uint64_t)rest >> 30 == 0U /* 16 us: near enough */
-                                     ? s->bend
-                                     : ftcs_addend_change(s->addend, s->correction));
+/* What C makes while the clock shows so much: what the clock would show at W more than at C. */
+static int64_t made_long(const ftcs_addend_servo* s, int64_t shown) {
+  return ftcs_addend_times(ftcs_addend_change(s->addend, s->correction), shown);
+}
+
+static int64_t made(const ftcs_addend_servo* s, int64_t shown) {
+  if ((uint32_t)((uint64_t)shown >> 26) > s->near) return made_long(s, shown);
+  return ftcs_addend_times(s->bend, shown);
+}
+
+/* From a reading until the correction ends, modulo 2^64. */
+static int64_t rest_of(const ftcs_addend_servo* s, uint32_t fraction, int64_t local_ns) {
+  const uint64_t rest_ns = (uint64_t)s->until_ns - (uint64_t)local_ns;
+  return (int64_t)((rest_ns << 16) - fraction);
+}
+
+void ftcs_addend_hold(ftcs_addend_servo* s, int64_t at_ns) {
+  const int64_t length = ftcs_addend_difference(at_ns, s->start_ns);
+  const int64_t late = length - ftcs_addend_difference(s->until_ns, s->start_ns);
+  const ftcs_addend_ratio bend = ftcs_addend_change(s->addend, s->correction);
+  s->expected = ftcs_addend_less(s->expected, ftcs_addend_times(bend, late));
+  s->until_ns = ftcs_addend_sum(s->start_ns, length >> 16);
+}
+
+int64_t ftcs_addend_bend(const ftcs_addend_servo* s, uint32_t fraction, int64_t local_ns) {
+  if (local_ns >= s->until_ns && ftcs_addend_timed(s->config) != 0) return 0;
+  return made(s, rest_of(s, fraction, local_ns));
 }
 
 /* Local minus origin, modulo 2^64. */
@@ -64,8 +85,11 @@ void ftcs_addend_prime(ftcs_addend_servo* servo, const ftcs_addend_sample* sampl
     servo->start_ns = local_ns;
     servo->phase = FTCS_PRIMED;
     remember(servo, sample);
-    servo->expected = ftcs_addend_sum(ahead_of(sample),
-                                      -ftcs_addend_bend(servo, local_ns, sample->local_fraction));
+    servo->expected = ahead_of(sample);
+    if (local_ns < servo->until_ns) {
+      servo->expected = ftcs_addend_less(
+          servo->expected, made(servo, rest_of(servo, sample->local_fraction, local_ns)));
+    }
   }
 }
 
@@ -80,7 +104,10 @@ typedef struct {
   uint32_t wanted;    /* rounded */
 } progress;
 
-static int64_t rounded(int64_t addend_q16) { return (addend_q16 + 32768) >> 16; }
+static int64_t rounded(int64_t addend_q16) { return addend_q16 >> 16; }
+
+/* 37 minutes, or negative. */
+static int32_t too_long(int64_t time_ns) { return (uint64_t)time_ns >> 41 != 0U ? 1 : 0; }
 
 static int32_t outside(int64_t addend, uint32_t least, uint32_t most) {
   const uint32_t low = (uint32_t)addend;
@@ -91,24 +118,24 @@ static int32_t outside(int64_t addend, uint32_t least, uint32_t most) {
  * the registers are written. Returns an enum ftcs_addend_verdict. */
 static int32_t compare(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p,
                        int64_t* reference) {
-  *reference = ftcs_addend_difference(in->origin_ns, s->origin_ns) +
-               ((int32_t)in->origin_fraction - (int32_t)s->origin_fraction);
+  const int64_t since_ns = ftcs_addend_less(in->origin_ns, s->origin_ns);
+  const int64_t waited_ns = ftcs_addend_less(in->now_ns, in->local_ns);
   if (in->local_ns <= s->start_ns) {
     if (in->local_ns > s->local_ns) return FTCS_ADDEND_STALE;
-    return *reference <= 0 ? FTCS_ADDEND_DUPLICATE : FTCS_ADDEND_IMPLAUSIBLE;
+    return since_ns <= 0 ? FTCS_ADDEND_DUPLICATE : FTCS_ADDEND_IMPLAUSIBLE;
   }
-  if ((uint64_t)*reference >= (uint64_t)FTCS_LONGEST) return FTCS_ADDEND_IMPLAUSIBLE;
-  p->waited = ftcs_addend_difference(in->now_ns, in->local_ns) - in->local_fraction;
+  if (too_long(since_ns) != 0 || too_long(ftcs_addend_sum(waited_ns, FTCS_LONGEST_NS / 2)) != 0) {
+    return FTCS_ADDEND_IMPLAUSIBLE;
+  }
+  *reference = since_ns * 65536 + ((int32_t)in->origin_fraction - (int32_t)s->origin_fraction);
+  p->waited = waited_ns * 65536 - in->local_fraction;
   p->faster = ftcs_addend_less(s->expected, p->ahead);
   p->ahead = ftcs_addend_sum(p->ahead, p->waited);
-  if (in->local_ns < s->until_ns || ftcs_addend_timed(s->config) == 0) {
-    /* C goes on. */
-    const int64_t bend = ftcs_addend_bend(s, in->local_ns, in->local_fraction);
+  if (in->local_ns < s->until_ns) { /* C goes on. */
+    const int64_t rest = rest_of(s, in->local_fraction, in->local_ns);
+    const int64_t bend = made(s, rest);
     p->faster = ftcs_addend_sum(p->faster, bend);
-    p->waited += bend;
-    if (in->now_ns < s->until_ns || ftcs_addend_timed(s->config) == 0) {
-      p->waited -= ftcs_addend_bend(s, in->now_ns, 0);
-    }
+    p->waited = ftcs_addend_sum(p->waited, p->waited < rest ? made(s, p->waited) : bend);
   }
   return FTCS_ADDEND_USED;
 }
@@ -135,15 +162,15 @@ static int32_t track(ftcs_addend_servo* s, const ftcs_addend_sample* in, progres
   if (verdict != FTCS_ADDEND_USED) return verdict;
   shown = ftcs_addend_less(reference, p->faster);
   if (shown <= 0 || shown > 2 * FTCS_LONGEST) return FTCS_ADDEND_IMPLAUSIBLE;
-  if (ftcs_addend_filter_of(s->config) != NULL &&
-      ftcs_addend_filter_of(s->config)(s, shown, &p->faster) == 0) {
-    return FTCS_ADDEND_REJECTED;
+  if (ftcs_addend_filter_of(s->config) != NULL) {
+    int64_t filtered = p->faster;
+    if (ftcs_addend_filter_of(s->config)(s, shown, &filtered) == 0) return FTCS_ADDEND_REJECTED;
+    p->faster = filtered;
   }
   p->time = interval_of(s, reference);
   rate = ftcs_addend_divide(p->faster, shown);
-  p->waited += ftcs_addend_times(p->waited, rate);
-  p->wanted_q16 = (int64_t)s->addend << 16;
-  p->wanted_q16 += ftcs_addend_times(p->wanted_q16, rate);
+  p->waited = ftcs_addend_sum(p->waited, ftcs_addend_times(rate, p->waited));
+  p->wanted_q16 = (int64_t)((uint64_t)s->addend << 16 | 32768U) + ftcs_addend_of(rate, s->addend);
   wanted = rounded(p->wanted_q16);
   p->wanted = (uint32_t)wanted;
   return outside(wanted, s->lowest, s->highest) != 0 ? FTCS_ADDEND_IMPLAUSIBLE : FTCS_ADDEND_USED;
@@ -180,72 +207,55 @@ static void watch(ftcs_addend_servo* s, const ftcs_addend_config* c, uint32_t si
   if (ftcs_addend_filter_of(c) == NULL) s->deviation = ftcs_addend_average(s->deviation, size);
 }
 
-/* What of an offset is removed in T_c. The first action may step instead: in whole nanoseconds,
- * what that leaves is removed later. */
-static int64_t removed_of(ftcs_addend_servo* s, const ftcs_addend_config* c, int64_t offset,
-                          ftcs_addend_command* out) {
+/* What of an offset is removed in T_c. */
+static int64_t removed_of(ftcs_addend_servo* s, const ftcs_addend_config* c, int64_t offset) {
   const uint32_t size = ftcs_addend_size(offset);
-  out->step_ns = 0;
-  if (s->phase == FTCS_ACTING) {
-    watch(s, c, size);
-  } else if (ftcs_addend_steps(c) != 0 && size >> 4 >= c->step_ns) {
-    out->step_ns = ftcs_addend_less(0, out->offset_ns);
-    s->local_ns = ftcs_addend_sum(s->local_ns, out->step_ns);
-    s->expected = ftcs_addend_sum(s->expected, (int64_t)((uint64_t)out->step_ns << 16));
-    return 0;
-  } else {
-    /* all of it, but for a dwell of zero */
-  }
-  if (s->phase == FTCS_ACTING || c->dwell == 0U) {
-    return part_to_remove(s, c, offset, size >> 4);
-  }
+  if (s->phase == FTCS_ACTING) watch(s, c, size);
+  if (s->phase == FTCS_ACTING || c->dwell == 0U) return part_to_remove(s, c, offset, size >> 4);
   return offset;
 }
 
-static uint32_t limited(int64_t addend, uint32_t least, uint32_t most) {
-  if (addend < (int64_t)least) return least;
-  return addend > (int64_t)most ? most : (uint32_t)addend;
-}
-
 /* The tracking addend takes effect. Returns whether F limits it. */
-static int32_t follow(ftcs_addend_servo* s, const progress* p) {
+static int32_t follow(ftcs_addend_servo* s, progress* p) {
   s->addend = p->wanted;
-  s->fraction = (int16_t)(uint16_t)p->wanted_q16;
+  s->fraction = (int32_t)(uint16_t)p->wanted_q16 - 32768;
   if (outside(p->wanted, s->slowest, s->fastest) == 0) return 0;
-  s->addend = limited(p->wanted, s->slowest, s->fastest);
+  s->addend = p->wanted < s->slowest ? s->slowest : s->fastest;
   s->fraction = 0;
-  s->expected = ftcs_addend_sum(
-      s->expected, -ftcs_addend_times(p->waited, ftcs_addend_change(s->addend, p->wanted)));
+  p->ahead = ftcs_addend_sum(
+      p->ahead, -ftcs_addend_times(ftcs_addend_change(s->addend, p->wanted), p->waited));
   return 1;
 }
 
 /* C for T_c, in which the clock shows `removed` less; from start_ns on. */
 static void correct(ftcs_addend_servo* s, const progress* p, int64_t removed, int32_t limits) {
-  const int64_t bent = p->wanted_q16 - ftcs_addend_times(p->wanted_q16, s->bend);
+  const int64_t bent = p->wanted_q16 - ftcs_addend_of(s->bend, p->wanted);
   const int64_t correction = rounded(bent);
   /* What W's fraction made until start_ns. */
   int64_t beside = -ftcs_addend_signed_product((int32_t)(p->waited >> 21), s->fraction);
   int64_t length;
+  s->correction = (uint32_t)correction;
+  s->near = (uint32_t)((uint64_t)p->time >> 32);
   if (outside(correction, s->slowest, s->fastest) == 0) {
     s->phase = FTCS_ACTING;
-    s->correction = (uint32_t)correction;
   } else {
     limits = 1;
-    s->correction = limited(correction, s->slowest, s->fastest);
-    removed = -ftcs_addend_times(p->time, ftcs_addend_change(s->correction, s->addend));
+    s->correction = correction < (int64_t)s->slowest ? s->slowest : s->fastest;
+    removed = -ftcs_addend_times(ftcs_addend_change(s->correction, s->addend), p->time);
   }
   length = p->time - removed + 32768;
   s->until_ns = ftcs_addend_sum(s->start_ns, length >> 16);
-  if (limits != 0 || s->correction - s->addend + (s->addend >> 15) > s->addend >> 14) {
+  if (limits != 0 || (uint32_t)s->bend < 17U) {
     s->bend = ftcs_addend_change(s->addend, s->correction);
-    removed = ftcs_addend_times(length & ~(int64_t)65535, s->bend);
+    s->near = UINT32_MAX;
+    removed = ftcs_addend_times(s->bend, length & ~(int64_t)65535);
   } else {
     /* Below 69 s and 30 ppm: `removed` it is, but for what both addends are rounded by. */
-    beside +=
-        ftcs_addend_signed_product((int32_t)(p->time >> 21), (int16_t)(uint16_t)bent - s->fraction);
+    beside += ftcs_addend_signed_product((int32_t)(p->time >> 21),
+                                         (int32_t)(uint16_t)bent - 32768 - s->fraction);
   }
   removed += (int32_t)(beside >> 16) / (int32_t)((s->addend >> 21) + 1U);
-  s->expected = ftcs_addend_less(s->expected, removed);
+  s->expected = ftcs_addend_less(p->ahead, removed);
 }
 
 static void steer(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* p,
@@ -253,19 +263,19 @@ static void steer(ftcs_addend_servo* s, const ftcs_addend_sample* in, progress* 
   const ftcs_addend_config* c = s->config;
   int64_t removed;
   int32_t limits;
-  s->expected = ftcs_addend_less(p->ahead, p->waited);
-  removed = ftcs_addend_less(s->expected, in->path_delay_scaled);
-  if (FTCS_OPTIONS != 0) removed = ftcs_addend_less(removed, s->residue);
+  p->ahead = ftcs_addend_less(p->ahead, p->waited);
+  removed = ftcs_addend_less(p->ahead, in->path_delay_scaled);
+  if (ftcs_addend_filter_of(c) != NULL) removed = ftcs_addend_less(removed, s->residue);
   if (c->correction_ns != 0) p->time = c->correction_ns * 65536;
+  s->start_ns = in->now_ns;
+  removed = removed_of(s, c, removed);
+  limits = follow(s, p);
   if (ftcs_addend_timed(c) != 0) {
     p->time = p->waited < p->time >> 1 ? p->time - p->waited : p->time >> 1;
+    limits |= (int32_t)(p->time >> 52); /* 69 s: too long for what is near enough */
   }
-  removed = removed_of(s, c, removed, out);
-  limits = follow(s, p) | (int32_t)(p->time >> 52); /* 69 s: too long for what is near enough */
-  s->start_ns = ftcs_addend_sum(in->now_ns, out->step_ns);
   s->bend = ftcs_addend_divide(removed, p->time);
   correct(s, p, removed, limits);
-  out->act = 1;
   out->addend = s->correction;
   out->until_ns = ftcs_addend_timed(c) != 0 ? s->until_ns : INT64_MAX;
 }
@@ -277,32 +287,47 @@ static int64_t offset_ns_of(const ftcs_addend_sample* in) {
   return (int64_t)((uint64_t)in->local_ns - (uint64_t)in->origin_ns - (uint64_t)later);
 }
 
+/* The first action steps the clock by whole nanoseconds; what that leaves is removed as any offset.
+ */
+static int32_t far(const ftcs_addend_servo* s, int64_t offset_ns) {
+  const uint64_t size = offset_ns < 0 ? 0U - (uint64_t)offset_ns : (uint64_t)offset_ns;
+  return s->phase != FTCS_ACTING && size >= s->config->step_ns ? 1 : 0;
+}
+
 void ftcs_addend_take(ftcs_addend_servo* servo, const ftcs_addend_sample* sample,
                       ftcs_addend_command* out) {
-  int32_t verdict = FTCS_ADDEND_USED;
+  int32_t verdict = FTCS_ADDEND_IMPLAUSIBLE;
   progress p;
   p.ahead = ahead_of(sample);
   out->offset_ns = offset_ns_of(sample);
-  out->act = 0;
-  if (servo->phase != FTCS_EMPTY) {
-    verdict = track(servo, sample, &p);
-    if (verdict == FTCS_ADDEND_USED) {
-      remember(servo, sample);
-      steer(servo, sample, &p, out);
+  out->step_ns = 0;
+  out->until_ns = 0;
+  if (ftcs_addend_timed(servo->config) == 0) ftcs_addend_hold(servo, sample->now_ns);
+  if (servo->phase != FTCS_EMPTY) verdict = track(servo, sample, &p);
+  if (verdict == FTCS_ADDEND_USED) {
+    ftcs_addend_sample after;
+    const ftcs_addend_sample* in = sample;
+    if (ftcs_addend_steps(servo->config) != 0 && far(servo, out->offset_ns) != 0) {
+      out->step_ns = ftcs_addend_less(0, out->offset_ns);
+      p.ahead = ftcs_addend_sum(p.ahead, (int64_t)((uint64_t)out->step_ns << 16));
+      after = *sample;
+      after.local_ns = ftcs_addend_sum(after.local_ns, out->step_ns);
+      after.now_ns = ftcs_addend_sum(after.now_ns, out->step_ns);
+      in = &after;
     }
+    remember(servo, in);
+    steer(servo, in, &p, out);
+    out->act = 1;
+    out->state = (int32_t)FTCS_ADDEND_ACQUIRING + servo->locked;
+  } else {
     if (verdict == FTCS_ADDEND_IMPLAUSIBLE) {
       /* Which of the two samples is wrong cannot be known: again from the newer one. */
+      if (servo->phase == FTCS_EMPTY) verdict = FTCS_ADDEND_USED;
       ftcs_addend_reset(servo);
       ftcs_addend_prime(servo, sample);
     }
-  } else {
-    ftcs_addend_prime(servo, sample);
-  }
-  out->state = (int32_t)FTCS_ADDEND_ACQUIRING + servo->locked;
-  if (out->act == 0) {
+    out->act = 0;
     out->addend = servo->addend;
-    out->until_ns = 0;
-    out->step_ns = 0;
     out->state = ftcs_addend_state_of(servo);
   }
   out->verdict = verdict;

@@ -139,6 +139,7 @@ typedef struct ftcs_addend_servo {
   uint16_t local_fraction;
   int16_t whiteness; /* mean product of the signs of successive innovations, 256 is 1 */
   uint16_t last;     /* innovation: its sign, and whether it was doubted */
+  uint32_t near;     /* 2^10 ns: for no longer than that `bend` is near enough */
   int64_t origin_ns; /* of the last sample */
   int64_t local_ns;
   int64_t interval; /* between the last two samples, 2^-16 ns; zero: there were none */

@@ -11,7 +11,7 @@ ftcs_addend_config ftcs_addend_default_config(uint32_t nominal_addend) {
   c.limit_ppm = 500000;
   if (above < nominal_addend / 2U) {
     c.limit_ppm =
-        (uint32_t)(ftcs_addend_times(1000000 << 8, ftcs_addend_divide(above, nominal_addend)) >> 8);
+        (uint32_t)(ftcs_addend_times(ftcs_addend_divide(above, nominal_addend), 1000000 << 8) >> 8);
   }
   c.plausible_ppm = c.limit_ppm;
   c.gain_q16 = 4096;
@@ -23,42 +23,33 @@ ftcs_addend_config ftcs_addend_default_config(uint32_t nominal_addend) {
   return c;
 }
 
-/* 37 minutes, or negative. */
-static int32_t too_long(int64_t time_ns) { return (uint64_t)time_ns >> 41 != 0U ? 1 : 0; }
-
-static int32_t config_error(const ftcs_addend_config* c) {
-  if (c->limit_ppm - 1U >= 500000U || c->plausible_ppm - 1U >= 500000U) {
-    return FTCS_ADDEND_BAD_LIMIT;
-  }
-  if (c->gain_q16 > 65536U) return FTCS_ADDEND_BAD_GAIN;
-  if (c->band_leave_ns < c->band_enter_ns || c->lock_leave_ns < c->lock_enter_ns) {
-    return FTCS_ADDEND_BAD_BAND;
-  }
-  if (too_long(c->interval_ns | c->correction_ns) != 0 || c->step_ns >> 28 != 0U ||
-      (c->interval_ns != 0 && c->correction_ns > c->interval_ns)) {
-    return FTCS_ADDEND_BAD_TIME;
-  }
-#if FTCS_OPTIONS
-  if (c->filter != NULL && c->quiet_memory - 8U > 247U) return FTCS_ADDEND_BAD_MEMORY;
-  return FTCS_ADDEND_OK;
-#else
-  return c->filter != NULL || (c->step_ns | c->no_timer) != 0U ? FTCS_ADDEND_BAD_OPTION
-                                                               : FTCS_ADDEND_OK;
-#endif
-}
-
 int32_t ftcs_addend_init(ftcs_addend_servo* servo, const ftcs_addend_config* config,
                          uint32_t addend_now) {
-  const int32_t error = config_error(config);
+  const ftcs_addend_config* c = config;
   const uint32_t nominal = config->nominal_addend;
-  if (error != FTCS_ADDEND_OK) return error;
-  ftcs_addend_start(servo, config, addend_now);
-  /* A limit that does not fit 32 bits has wrapped. */
-  if (nominal == 0U || servo->fastest < nominal || servo->highest < nominal) {
-    return FTCS_ADDEND_BAD_NOMINAL;
+  int32_t error = FTCS_ADDEND_OK;
+  ftcs_addend_start(servo, c, addend_now);
+  if (addend_now - servo->slowest > servo->fastest - servo->slowest) {
+    error = FTCS_ADDEND_BAD_ADDEND;
   }
-  return addend_now < servo->slowest || addend_now > servo->fastest ? FTCS_ADDEND_BAD_ADDEND
-                                                                    : FTCS_ADDEND_OK;
+  /* Zero; or a limit that does not fit 32 bits, and has wrapped. */
+  if (nominal - 1U >= servo->fastest) error = FTCS_ADDEND_BAD_NOMINAL;
+  if (nominal - 1U >= servo->highest) error = FTCS_ADDEND_BAD_NOMINAL;
+  if (c->limit_ppm - 1U >= 500000U) error = FTCS_ADDEND_BAD_LIMIT;
+  if (c->plausible_ppm - 1U >= 500000U) error = FTCS_ADDEND_BAD_LIMIT;
+  if (c->gain_q16 > 65536U) error = FTCS_ADDEND_BAD_GAIN;
+  if (c->band_leave_ns < c->band_enter_ns) error = FTCS_ADDEND_BAD_BAND;
+  if (c->lock_leave_ns < c->lock_enter_ns) error = FTCS_ADDEND_BAD_BAND;
+  if (c->interval_ns != 0 && c->correction_ns > c->interval_ns) error = FTCS_ADDEND_BAD_TIME;
+  if ((uint64_t)(c->interval_ns | c->correction_ns) >> 41 != 0U) error = FTCS_ADDEND_BAD_TIME;
+#if FTCS_OPTIONS
+  if (c->step_ns >> 28 != 0U) error = FTCS_ADDEND_BAD_TIME;
+  if (c->filter != NULL && c->quiet_memory - 8U > 247U) error = FTCS_ADDEND_BAD_MEMORY;
+#else
+  if ((c->step_ns | c->no_timer) != 0U) error = FTCS_ADDEND_BAD_OPTION;
+  if (c->filter != NULL) error = FTCS_ADDEND_BAD_OPTION;
+#endif
+  return error;
 }
 
 /* In units of addends, as everything that a register can hold is limited by F. */
@@ -76,7 +67,7 @@ int64_t ftcs_addend_elapsed(const ftcs_addend_servo* servo, int64_t local_ns) {
     const int64_t gained = ftcs_addend_sum((int64_t)(ahead_ns << 16), fraction);
     since = ftcs_addend_sum(since, gained);
     since = ftcs_addend_less(since, servo->expected);
-    since = ftcs_addend_less(since, ftcs_addend_bend(servo, local_ns, 0));
+    since = ftcs_addend_less(since, ftcs_addend_bend(servo, 0, local_ns));
   }
   return since;
 }
@@ -92,35 +83,31 @@ void ftcs_addend_wrote(ftcs_addend_servo* servo, int64_t at_ns, uint32_t addend,
     int64_t before = ftcs_addend_elapsed(servo, servo->start_ns);
     /* What the clock showed until then, and a constant. */
     int64_t shown = ftcs_addend_sum(servo->expected, before);
-    shown = ftcs_addend_sum(shown, ftcs_addend_bend(servo, servo->start_ns, 0) + late);
+    shown = ftcs_addend_sum(shown, ftcs_addend_bend(servo, 0, servo->start_ns) + late);
     /* It went on as it had from the sample to start_ns, near enough. */
     if (planned > 0) {
       const ftcs_addend_ratio faster =
           ftcs_addend_divide(ftcs_addend_less(before, planned), planned);
-      before = ftcs_addend_sum(before, ftcs_addend_times(late, faster));
+      before = ftcs_addend_sum(before, ftcs_addend_times(faster, late));
     }
     before = ftcs_addend_sum(before, late);
     servo->addend = cut(servo, next_addend);
     servo->fraction = (int32_t)ftcs_addend_clamp(
         servo->fraction + ((int64_t)was - (int64_t)servo->addend) * 65536, -INT32_MAX, INT32_MAX);
     before =
-        ftcs_addend_sum(before, ftcs_addend_times(before, ftcs_addend_change(servo->addend, was)));
+        ftcs_addend_sum(before, ftcs_addend_times(ftcs_addend_change(servo->addend, was), before));
     servo->correction = cut(servo, addend);
     servo->bend = ftcs_addend_change(servo->addend, servo->correction);
+    servo->near = UINT32_MAX;
     servo->start_ns = ftcs_addend_sum(servo->start_ns, late >> 16);
     if (servo->start_ns >= servo->until_ns) servo->phase = FTCS_PRIMED; /* it was never made */
-    shown = ftcs_addend_less(shown, ftcs_addend_bend(servo, servo->start_ns, 0));
+    shown = ftcs_addend_less(shown, ftcs_addend_bend(servo, 0, servo->start_ns));
     servo->expected = ftcs_addend_less(shown, before);
   }
 }
 
 void ftcs_addend_wrote_next(ftcs_addend_servo* servo, int64_t at_ns) {
-  if (ftcs_addend_timed(servo->config) != 0) {
-    const int64_t late = ftcs_addend_difference(at_ns, servo->until_ns);
-    const ftcs_addend_ratio bend = ftcs_addend_change(servo->addend, servo->correction);
-    servo->expected = ftcs_addend_less(servo->expected, ftcs_addend_times(late, bend));
-    servo->until_ns = at_ns;
-  }
+  if (ftcs_addend_timed(servo->config) != 0) ftcs_addend_hold(servo, at_ns);
 }
 
 void ftcs_addend_stepped(ftcs_addend_servo* servo, int64_t by_ns) {

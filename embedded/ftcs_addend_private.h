@@ -41,34 +41,48 @@ static inline ftcs_addend_filter ftcs_addend_filter_of(const ftcs_addend_config*
 
 enum { FTCS_EMPTY = 0, FTCS_PRIMED = 1, FTCS_ACTING = 2 };
 
-/* a b; the same, signed; and a b / 2^32, towards minus infinity. A processor that multiplies words
+/* a b, with no number signed, both, or the second one. A processor that multiplies words
  * to a word alone (Cortex-M0+) is served by four products of halves. */
 #if defined(__ARM_ARCH_6M__) || defined(FTCS_ADDEND_NARROW)
 uint64_t ftcs_addend_product(uint32_t a, uint32_t b);
 int64_t ftcs_addend_signed_product(int32_t a, int32_t b);
-int64_t ftcs_addend_mixed_upper(uint32_t a, int32_t b);
+int64_t ftcs_addend_mixed_product(uint32_t a, int32_t b);
 #else
 static inline uint64_t ftcs_addend_product(uint32_t a, uint32_t b) { return (uint64_t)a * b; }
 static inline int64_t ftcs_addend_signed_product(int32_t a, int32_t b) { return (int64_t)a * b; }
-static inline int64_t ftcs_addend_mixed_upper(uint32_t a, int32_t b) {
-  return (int64_t)a * b >> 32;
-}
+static inline int64_t ftcs_addend_mixed_product(uint32_t a, int32_t b) { return (int64_t)a * b; }
 #endif
 
-/* n / d to 30 bits, d > 0, both below 2^62 in magnitude; at most 4. */
+/* n / d to 30 bits, d > 0, both below 2^62 in magnitude; from 4 on something between 2 and 4. */
 ftcs_addend_ratio ftcs_addend_divide(int64_t n, int64_t d);
 
 /* to / from - 1, from > 0. */
 ftcs_addend_ratio ftcs_addend_change(uint32_t to, uint32_t from);
 
-/* x r towards minus infinity, |x| < 2^59 and |x r| < 2^61. */
-int64_t ftcs_addend_times(int64_t x, ftcs_addend_ratio r);
+/* r x towards minus infinity, |x| < 2^59 and |r x| < 2^61. */
+int64_t ftcs_addend_times(ftcs_addend_ratio r, int64_t x);
+
+/* r addend in 2^-16, as ftcs_addend_times() has it. */
+#if FTCS_OPTIONS
+int64_t ftcs_addend_of(ftcs_addend_ratio r, uint32_t addend);
+#else
+static inline int64_t ftcs_addend_of(ftcs_addend_ratio r, uint32_t addend) {
+  return ftcs_addend_times(r, (int64_t)addend << 16);
+}
+#endif
 
 /* |x| in 1/16 ns, at most UINT32_MAX (0.27 s). */
-uint32_t ftcs_addend_size(int64_t x);
+static inline uint32_t ftcs_addend_size(int64_t x) {
+  const uint64_t sign = (uint64_t)(x >> 63);
+  const uint64_t size = (((uint64_t)x ^ sign) - sign) >> 12;
+  return size > UINT32_MAX ? UINT32_MAX : (uint32_t)size;
+}
 
 /* a - b in 2^-16 ns, modulo 2^64 ns (a counter that wraps is no event), cut at +- FTCS_LONGEST. */
 int64_t ftcs_addend_difference(int64_t a_ns, int64_t b_ns);
+
+/* C went on until the clock showed this. */
+void ftcs_addend_hold(ftcs_addend_servo* s, int64_t at_ns);
 
 /* Modulo 2^64. */
 static inline int64_t ftcs_addend_sum(int64_t a, int64_t b) {
@@ -90,7 +104,7 @@ static inline uint32_t ftcs_addend_average(uint32_t mean, uint32_t size) {
 
 /* What the correction under way makes from a reading until it ends: what the clock would show at W
  * more than at C. */
-int64_t ftcs_addend_bend(const ftcs_addend_servo* s, int64_t local_ns, uint16_t fraction);
+int64_t ftcs_addend_bend(const ftcs_addend_servo* s, uint32_t fraction, int64_t local_ns);
 
 /* [T_sync] Of the last two gaps the shorter: a missing message does not make the interval longer.
  */

@@ -39,7 +39,7 @@ static void adapt_memory(ftcs_addend_servo* s, int64_t innovation) {
 int32_t ftcs_addend_quiet(ftcs_addend_servo* s, int64_t shown, int64_t* ahead) {
   /* What the wanted rate gains on the written one. */
   const int64_t drift =
-      ftcs_addend_times(shown, ftcs_addend_divide(s->fraction, (int64_t)s->addend << 16));
+      ftcs_addend_times(ftcs_addend_divide(s->fraction, (int64_t)s->addend << 16), shown);
   const int64_t innovation = *ahead - drift - s->residue;
   const int32_t unlike =
       s->memory >= 8U && ftcs_addend_size(innovation) > 8U * s->deviation + 16U ? 1 : 0;
@@ -57,8 +57,8 @@ int32_t ftcs_addend_quiet(ftcs_addend_servo* s, int64_t shown, int64_t* ahead) {
     const int64_t n = s->memory;
     const int64_t pairs = n * (n + 1);
     s->deviation = ftcs_addend_average(s->deviation, ftcs_addend_size(innovation));
-    s->residue = ftcs_addend_times(innovation, ftcs_addend_divide(4 * n - 2, pairs)) - innovation;
-    *ahead = drift + ftcs_addend_times(innovation, ftcs_addend_divide(6, pairs));
+    s->residue = ftcs_addend_times(ftcs_addend_divide(4 * n - 2, pairs), innovation) - innovation;
+    *ahead = drift + ftcs_addend_times(ftcs_addend_divide(6, pairs), innovation);
     adapt_memory(s, innovation);
   }
   return 1;
