@@ -2,10 +2,12 @@
 #include "ftcs/daemon/follower_record.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
+#include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/real_clock.h"
 #include "ftcs/daemon/watch/follower_watch.h"
 
@@ -114,6 +116,7 @@ FollowerRecord::FollowerRecord(const PtpOptions& options, Log& log, StateKeeper&
 void FollowerRecord::begin() {
   std::fflush(stdout);  // from here on lines go by the writer
   if (options_.output == Output::kCsv) samples_.write(csv_header() + "\n");
+  watch_output();
 }
 
 void FollowerRecord::add(const node::Steered& steered, FreeRunningTime now,
@@ -239,7 +242,14 @@ void FollowerRecord::report(const SampleRecord& record, std::optional<Duration> 
       samples_.write(csv_line(record) + "\n");
       break;
   }
-  // A reader that goes away, such as head, ends nothing that keeps a clock.
+  watch_output();
+  if (!record.offset_known) return;
+  summary_.add(record);
+  report_text(record, sync_interval);
+}
+
+// A reader that goes away, such as head, ends nothing that keeps a clock.
+void FollowerRecord::watch_output() {
   if (samples_.error() != 0 && !std::exchange(output_failed_, true)) {
     log_(LogLevel::kWarning, "standard output: {}; samples are lost, the clock is steered on",
          platform::write_failure(samples_.error()));
@@ -247,9 +257,11 @@ void FollowerRecord::report(const SampleRecord& record, std::optional<Duration> 
   if (const std::uint64_t lost = samples_.take_lost(); lost > 0) {
     log_(LogLevel::kWarning, "standard output: {} samples lost, nobody reads them", lost);
   }
-  if (!record.offset_known) return;
-  summary_.add(record);
-  report_text(record, sync_interval);
+}
+
+int FollowerRecord::exit_code() const {
+  if (samples_.error() != 0 && samples_.error() != EPIPE) return kRuntimeError;
+  return locked() ? kSuccess : kNotLocked;
 }
 
 void FollowerRecord::report_text(const SampleRecord& record,

@@ -64,8 +64,11 @@ class FollowerRecord {
     std::string since_lock{};              ///< ptp4l's summary of all samples since the first lock
   };
   [[nodiscard]] Status status(FreeRunningTime now) const;
+  /// ExitCode: kRuntimeError where samples could not be written, unless for want of a reader.
+  [[nodiscard]] int exit_code() const;
 
  private:
+  void watch_output();
   void add_sync(const node::Steered& steered, double time_s, std::optional<Duration> sync_interval);
   void report(const SampleRecord& record, std::optional<Duration> sync_interval);
   [[nodiscard]] bool has_room_for_line(double time_s);

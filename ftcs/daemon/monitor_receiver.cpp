@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/status_report.h"
 #include "ftcs/daemon/watch/follower_watch.h"
 #include "ftcs/platform/stop_flag.h"
@@ -234,7 +233,7 @@ int MonitorReceiver::finish() {
       counters.syncs, counters.delays, counters.malformed, counters.unknown_tlvs,
       counters.missed_syncs, counters.repeated, counters.restarts, counters.transmitter_changes,
       counters.reference_jumps, timestamps().foreign_steps());
-  return follower_.locked() ? kSuccess : kNotLocked;
+  return follower_.record().exit_code();
 }
 
 ptp::ManagedPort MonitorReceiver::managed_port() {

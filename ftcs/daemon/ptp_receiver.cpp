@@ -5,7 +5,6 @@
 #include <utility>
 #include <variant>
 
-#include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/port_config.h"
 #include "ftcs/daemon/status_report.h"
 #include "ftcs/daemon/watch/follower_watch.h"
@@ -238,7 +237,7 @@ int PtpReceiver::finish() {
   if (!node_.locked()) log_findings(LogLevel::kNotice);
   log_peer_delay(node_.port().peer_delay());
   log_unusual(node_.port().counters());
-  return node_.locked() ? kSuccess : kNotLocked;
+  return record_.exit_code();
 }
 
 ptp::ManagedPort PtpReceiver::managed_port() {

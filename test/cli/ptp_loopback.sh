@@ -37,7 +37,7 @@ done
 pids+=("${corrections[@]}")
 ptp > "$folder/interrupted" 2>&1 &
 interrupted=$!
-# Whoever goes away, such as head, ends no clock; nor does a full disk.
+# Whoever goes away, such as head, ends no clock; nor does a full disk, which is an error at the end.
 ptp --json "${receive[@]}" 2> "$folder/reader.log" > >(head -n 2 > "$folder/reader") &
 reader=$!
 full=
@@ -58,8 +58,8 @@ for log in reader text; do
   [ "$(grep -c "standard output: nobody reads it any more" "$folder/$log.log")" -eq 1 ] || fail "$log: it is not said, once"
 done
 grep -q "summary: locked" "$folder/reader.log" || fail "--json, whose reader went away: no summary"
-[ -z "$full" ] || { wait $full && grep -q "standard output: No space left on device; samples are lost" "$folder/full.log"; } ||
-  fail "--csv to a full disk"
+[ -z "$full" ] || { wait $full; [ $? -eq 1 ] && grep -q "standard output: No space left on device; samples are lost" "$folder/full.log"; } ||
+  fail "--csv to a full disk: expected exit code 1 and one sentence"
 wait $step || fail "--first-step: exit code $?, expected 0 (locked)"
 wait $far; [ $? -eq 3 ] || fail "2 s away without --first-step: expected exit code 3 (not locked)"
 grep -q "the offset is 2.000 s, more than 1 s: not followed, 1 in a row; .*(--offset, 37s if it shows TAI)" "$folder/far" || fail "no clear warning when 2 s away"
