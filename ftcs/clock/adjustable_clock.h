@@ -27,12 +27,14 @@ enum class ClockError : std::uint8_t {
 ///     F_0 <= F < F_0 + T_c / a_t:   L = L_0 + step + a_c (F - F_0)      correction
 ///     afterwards:                   continuous, at the rate a_t         tracking
 ///
-/// with a_c, a_t, T_c, step of the ServoCommand applied at F_0. A command replaces its predecessor,
-/// even in the middle of a correction, whose rest is dropped; nothing accumulates. A clock that
-/// takes a command guarantees its expiry: after correction_time it runs at tracking_rate even if
-/// nobody calls again (a virtual clock exactly, others by a timer).
+/// with a_c = correction_rate, a_t = tracking_rate, T_c = correction_time (in reference time, which
+/// is local time at the rate a_t) and step of the ServoCommand applied at F_0. A command replaces
+/// its predecessor, even in the middle of a correction, whose rest is dropped; nothing accumulates.
+/// A clock that takes a command guarantees its expiry: after correction_time it runs at
+/// tracking_rate even if nobody calls again (a virtual clock exactly, others by a timer).
 ///
-///     const auto applied = clock.apply({.tracking_rate = Rate::from_ppb(120.0)});
+///     const auto applied = clock.apply({.tracking_rate = Rate::from_ppb(120.0)});   // faster
+///     if (!applied) return tell(applied.error());
 ///     const LocalTime shown = clock.local_at(stamp);  // stamp: of the free-running oscillator
 ///
 /// Implementations: VirtualClock, AddendClock, RegisterClock; platform::KernelClock. One thread

@@ -61,7 +61,7 @@ struct FtcsConfig {
 ///
 ///     FtcsServo servo({.sync_interval = 1s, .offset_gain = 1.0});
 ///     const ServoUpdate update = servo.update({t1, path_delay, t2_local, t2_free}, clock.read());
-///     if (update.has_command) clock.apply(update.command);
+///     if (update.has_command && !clock.apply(update.command)) ...   // the clock did not take it
 ///
 /// The clock is exact after one interval where k(n) is (p = 1, no noise, constant rates): the
 /// convergence in one synchronizing cycle of Section III-A. Noise: eq. (24).
@@ -81,7 +81,7 @@ class FtcsServo {
   /// known: all is begun anew from this one, and the next good one commands as the first did.
   ///
   /// A command that comes later than T_c / 2 after its sample takes T_c / 2 all the same, so that
-  /// the rate never exceeds twice the one of a prompt command.
+  /// the part of the rate that removes the offset never exceeds twice that of a prompt command.
   ServoUpdate update(const SyncSample& sample, const ClockReading& now) noexcept;
   /// Takes a first sample without acting: k(n) needs no path delay, so that a message from before
   /// the delay was known still counts. No effect unless the servo is empty.

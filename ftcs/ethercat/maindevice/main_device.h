@@ -47,7 +47,8 @@ struct MainDeviceConfig {
   Nanoseconds stop_timeout{200'000'000};
 };
 
-/// Where the MainDevice is; stages are passed in this order, and a failure leads to the last two.
+/// Where the MainDevice is; stages are passed in this order. A failure of the cyclic stage, and
+/// stop(), lead to the last two, a failure before it to the last.
 enum class Stage : std::uint8_t {
   kScan,       ///< count, addresses, identity, SII, topology (Scanner)
   kClocks,     ///< delays, offsets, drift of the distributed clocks (ClockSetup)
@@ -92,13 +93,18 @@ struct CycleCounters {
 /// takes what came back or did not. Before the cyclic stage the caller sends the next frame as soon
 /// as the last is answered; in it, at each cycle's instant.
 ///
-///     MainDevice main(config);
-///     while (!main.cyclic() && main.stage() != Stage::kStopped) {   // some 15,000 frames
+///     MainDevice main(config);                           // your link, frame and stamps
+///     const auto exchange = [&] {
 ///       link.send(main.next_frame());
-///       if (link.receive(frame, 10ms)) main.on_frame(frame, stamps); else main.on_timeout();
-///     }
-///     main.request_operational();                                   // once the cycle is in phase
-///     each cycle: write main.outputs(n), send, receive as above, read main.inputs(n)
+///       while (link.receive(frame, stamps, 10ms))        // what is ignored is not the answer
+///         if (main.on_frame(frame, stamps) != FrameOutcome::kIgnored) return;
+///       main.on_timeout();
+///     };
+///     while (!main.cyclic() && main.stage() != Stage::kStopped) exchange();
+///     if (main.stage() == Stage::kStopped) return tell(main.failure());
+///     main.request_operational();                        // once the cycle is in phase
+///
+/// Then, each cycle: write outputs(n), exchange, read inputs(n).
 ///
 /// One frame is out at a time, with all that a cycle needs (CyclicExchange): the reference's system
 /// time by FRMW of 0x0910, the process image by LRW, states and clock differences. The expected
