@@ -243,11 +243,11 @@ TwoMachinesRun run_two_machines(const TwoMachinesWorld& world, MachineMode mode,
 
 double kalman_sync0_rms_ns(const TwoMachinesWorld& world) {
   constexpr double kTickVariance = 1.0 / 12.0;
-  constexpr double kEscTick_ns = 10.0;
+  constexpr double kEscTick = 10.0;  // ns
   const double cycle_s = static_cast<double>(world.cycle.count()) * 1e-9;
   const double q = world.wander * world.wander * 1e18;
   const double stamp = world.stamp_tick_ns * world.stamp_tick_ns * kTickVariance;
-  const double esc = kEscTick_ns * kEscTick_ns * kTickVariance;
+  const double esc = kEscTick * kEscTick * kTickVariance;
   // Two stamps make a sample, and a Sync and a request come in each interval.
   const double receiver = kalman_variance(2.0 * stamp, q, world.sync_interval_s / 2.0);
   const double frame = world.frame_stamp_ns * world.frame_stamp_ns + esc;

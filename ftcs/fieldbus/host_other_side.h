@@ -18,11 +18,11 @@ class HostOtherSide final : public ethercat::OtherSide {
   explicit HostOtherSide(platform::Kernel& kernel) noexcept : kernel_(kernel) {}
   [[nodiscard]] std::optional<std::uint64_t> system_time(
       ethercat::WireTime instant) noexcept override {
-    constexpr std::int64_t kTick_ns = 10;
+    constexpr std::int64_t kTick = 10;  // ns
     const std::int64_t ahead = ahead_of_monotonic_ns(kernel_, CLOCK_REALTIME);
     const std::int64_t shown =
         on_dc_epoch(instant.since_epoch().rounded_ns() + ahead).since_epoch().rounded_ns();
-    return static_cast<std::uint64_t>(shown - shown % kTick_ns);
+    return static_cast<std::uint64_t>(shown - shown % kTick);
   }
 
  private:
