@@ -71,6 +71,15 @@ std::string plan_text(const JumpPlan& plan) {
                      kLargestOffset.count() / 1e9);
 }
 
+/// Every limit that stands in the way: with one of them lifted the next would be met.
+std::string jump_text(const node::Note& note, const StepPolicy& step) {
+  if (!note.gated) return plan_text(note.plan);
+  const bool far = abs(note.jump) > Duration{kLargestOffset};
+  return far && !step.permits(true)
+             ? "not followed (--max-change), and " + plan_text({JumpResponse::kRefused, {}})
+             : "not followed (--max-change)";
+}
+
 std::string foreign_text(const node::Note& note) {
   return fmt::format("the transmitter's peer delay messages are {:.0f} ns off its Syncs",
                      note.difference_ns);
@@ -178,7 +187,7 @@ std::optional<std::string> FollowerRecord::add(const node::Note& note) {
       break;
     case NoteKind::kReferenceJumped:
       log_(LogLevel::kWarning, "{}: the reference jumped by {:+.9f} s: {}", label_,
-           note.jump.seconds(), note.gated ? "not followed (--max-change)" : plan_text(note.plan));
+           note.jump.seconds(), jump_text(note, step_policy(options_)));
       break;
     case NoteKind::kOffsetRefused:
       log_(LogLevel::kWarning,

@@ -54,7 +54,7 @@ class WrongEpoch : public testing::Test {
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
     const int code = run();
-    (void)testing::internal::GetCapturedStdout();
+    said = testing::internal::GetCapturedStdout();
     errors = testing::internal::GetCapturedStderr();
     kernel.held_names.clear();
     lasted_s = (kernel.ideal_ns - start) / kSecond;
@@ -72,6 +72,7 @@ class WrongEpoch : public testing::Test {
   Log log{kernel, stdout, 5};
   PtpOptions ptp;
   PhcOptions phc;
+  std::string said;
   std::string errors;
   double lasted_s = 0.0;
 };
@@ -169,6 +170,26 @@ TEST_F(WrongEpoch, a_wrong_date_in_mid_run_is_not_followed_and_left_when_it_is_g
     };
     EXPECT_EQ(follow_network(), kSuccess) << errors;
     EXPECT_LT(largest, 2'000.0);
+  }
+}
+
+// With one limit lifted the next would be met: the line says both.
+TEST_F(WrongEpoch, a_jump_that_two_limits_refuse_names_the_flags_of_both) {
+  for (const bool first_step : {false, true}) {
+    choose(ClockKind::kPhc);
+    ptp.follower.first_step = first_step;
+    kernel.reference_ahead = kTai;
+    ptp.duration = Duration::from_ns(40 * kSecond);
+    const double start = kernel.ideal_ns;
+    kernel.on_second = [&] {
+      if (kernel.ideal_ns - start > 20 * kSecond) kernel.reference_ahead = kTai + 5'000 * kSecond;
+    };
+    (void)follow_network();
+    EXPECT_NE(said.find("not followed (--max-change)"), std::string::npos) << said;
+    EXPECT_EQ(said.find("(--max-change), and more than 1 s is refused (--first-step") !=
+                  std::string::npos,
+              !first_step)
+        << said;
   }
 }
 
