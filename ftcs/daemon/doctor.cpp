@@ -72,8 +72,8 @@ PtpOptions quiet(PtpOptions options) {
   return options;
 }
 
-/// Whether somebody who is none of ours steers a clock: its frequency is looked at again and again
-/// in a thread, for as long as this lives. Nothing is touched.
+/// Whether somebody who is none of ours steers a clock: its frequency is looked at again and again.
+/// Nothing is touched.
 class ClockWatch {
  public:
   ClockWatch(platform::Kernel& kernel, const PtpOptions& options, bool hardware) {
@@ -85,35 +85,41 @@ class ClockWatch {
     if (!open(platform::ClockAccess::kSteer)) return;
     auto device = open(platform::ClockAccess::kRead);
     if (!device) return;
-    name_ = device->name();
-    thread_ = std::thread([this, &kernel, clock = std::move(*device)]() mutable {
-      constexpr std::int64_t kTurn_ns = 100'000'000;
-      auto last = clock.rate();
-      while (!stop_) {
-        kernel.sleep_until(kernel.clock_ns(CLOCK_MONOTONIC) + kTurn_ns);
-        const auto now = clock.rate();
-        if (last && now && now->ratio() != last->ratio()) ++changes_;
-        last = now;
-      }
-    });
+    device_.emplace(std::move(*device));
+    look();
   }
-  ClockWatch(const ClockWatch&) = delete;
-  ClockWatch& operator=(const ClockWatch&) = delete;
-  ~ClockWatch() { (void)changes(); }
+  void look() {
+    if (!device_) return;
+    const auto now = device_->rate();
+    if (!now) return;
+    if (last_ && now->ratio() != last_->ratio()) ++changes_;
+    last_ = *now;
+  }
 
-  /// How often it was changed. Ends the watch.
-  [[nodiscard]] std::uint64_t changes() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-    return changes_;
-  }
-  [[nodiscard]] const std::string& name() const { return name_; }
+  /// How often it was changed.
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
+  [[nodiscard]] std::string name() const { return device_ ? device_->name() : std::string(); }
 
  private:
-  std::atomic<bool> stop_ = false;
+  std::optional<platform::ClockDevice> device_{};
+  std::optional<Rate> last_{};
   std::uint64_t changes_ = 0;
-  std::string name_;
-  std::thread thread_;
+};
+
+/// Follows, and looks at the clock that would be steered once in each turn, a second at most.
+class Trial final : public PtpReceiver {
+ public:
+  Trial(platform::Kernel& kernel, const PtpOptions& options, Log& log,
+        std::unique_ptr<platform::TimestampClock> timestamps, const PortFacts& facts,
+        ClockWatch* clock)
+      : PtpReceiver(kernel, options, log, std::move(timestamps), facts, nullptr), clock_(clock) {}
+
+ private:
+  void housekeeping(FreeRunningTime now) override {
+    PtpReceiver::housekeeping(now);
+    if (clock_ != nullptr) clock_->look();
+  }
+  ClockWatch* clock_;
 };
 
 /// Another one that announces itself, in this domain or another.
@@ -246,7 +252,7 @@ std::optional<Duration> first_offset(platform::Kernel& kernel, const PtpOptions&
 
 /// What the port, the wire and the clock that would be steered have shown.
 diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWatch& wire,
-                            ClockWatch* clock, const PtpOptions& options) {
+                            const ClockWatch* clock, const PtpOptions& options) {
   diagnosis::PortSeen seen = port.seen();
   seen.on_wire = wire.finish();
   seen.link_up = is_link_up(kernel, options.interface);
@@ -289,7 +295,7 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   std::optional<ClockWatch> clock;
   if (steers) clock.emplace(kernel, options, phc);
   WireWatch wire(options.interface, identity->clock);
-  PtpReceiver port(kernel, options, log, std::move(clocks->timestamps), facts, nullptr);
+  Trial port(kernel, options, log, std::move(clocks->timestamps), facts, clock ? &*clock : nullptr);
   (void)port.run();
   const auto far = steers ? first_offset(kernel, given, phc, port) : std::nullopt;
   diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr, options);
