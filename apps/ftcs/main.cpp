@@ -38,8 +38,14 @@ std::string unexpected(const CLI::App& app) {
                      ftcs::did_you_mean(ftcs::suggestion(name, names)));
 }
 
-int run(int argc, char** argv) {
+int run(std::vector<std::string> words) {
   using namespace ftcs::app;
+  // As others have it: "help ptp" is "ptp --help".
+  if (!words.empty() && words.front() == "help") {
+    words.erase(words.begin());
+    words.emplace_back("--help");
+  }
+  const std::string name = words.empty() ? std::string() : words.front();
   CLI::App app{"Clocks that follow other clocks: frequency-tracking clock servos over PTP", "ftcs"};
   app.set_version_flag("-v,--version", "ftcs " FTCS_VERSION);
   app.require_subcommand(1);
@@ -58,22 +64,22 @@ int run(int argc, char** argv) {
   add_status_command(app, exit_code);
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
-  const bool has_command =
-      argc > 1 && std::find(commands.begin(), commands.end(), argv[1]) != commands.end();
-  if (argc > 1 && argv[1][0] != '-' && !has_command) {
-    fmt::print(stderr, "ftcs: unknown command '{}'{} (see ftcs --help)\n", argv[1],
-               ftcs::did_you_mean(command_for(argv[1], commands)));
+  const bool has_command = std::find(commands.begin(), commands.end(), name) != commands.end();
+  if (!words.empty() && !name.starts_with('-') && !has_command) {
+    fmt::print(stderr, "ftcs: unknown command '{}'{} (see ftcs --help)\n", name,
+               ftcs::did_you_mean(command_for(name, commands)));
     return kUsageError;
   }
   try {
-    app.parse(argc, argv);
+    std::reverse(words.begin(), words.end());  // CLI11 takes them from the end
+    app.parse(words);
   } catch (const CLI::Success& request) {  // --help, --version
     return app.exit(request);
   } catch (const CLI::Error& error) {
-    const std::string name = has_command ? fmt::format("ftcs {}", argv[1]) : "ftcs";
+    const std::string program = has_command ? "ftcs " + name : "ftcs";
     const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
-    fmt::print(stderr, "{}: {} (see {} --help)\n", name, is_extra ? unexpected(app) : error.what(),
-               name);
+    fmt::print(stderr, "{}: {} (see {} --help)\n", program,
+               is_extra ? unexpected(app) : error.what(), program);
     return kUsageError;
   }
   return exit_code;
@@ -83,7 +89,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    const int exit_code = run(argc, argv);
+    const int exit_code = run({argv + std::min(argc, 1), argv + argc});
     // What was printed may still lie in a buffer: a full disk shows only here.
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
     fmt::print(stderr, "ftcs: cannot write to standard output\n");

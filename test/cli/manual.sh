@@ -20,6 +20,11 @@ for command in "" analyse compare demo doctor ethercat ethercat-segment paper ph
     grep -qe "$option" "$work/plain.txt" || fail "the page of '$command' does not name $option"
   done
 done
+for command in "" ptp "ethercat scan"; do
+  # shellcheck disable=SC2086
+  cmp <("$ftcs" help $command) <("$ftcs" $command --help) || fail "'help $command' is not '$command --help'"
+done
+
 "$ftcs" manual man nonsense 2> "$work/error" && fail "a page of a command that is none"
 grep -q "no command 'nonsense'" "$work/error"
 

@@ -32,6 +32,7 @@ expect 2 "unknown command 'follow'" follow
 expect 2 "unknown command 'ptp4l'; did you mean 'ptp'?" ptp4l -i lo
 expect 2 "unknown command 'phc2sys'; did you mean 'phc'?" phc2sys -a -r
 expect 2 "unknown command 'statu'; did you mean 'status'?" statu
+expect 2 "unknown command 'statu'; did you mean 'status'?" help statu
 expect 2 "subcommand is required"
 expect 2 "unknown option '--bogus' (see" ptp --bogus
 expect 2 "unknown option '--domain'; did you mean '--domainNumber'?" ptp -i lo --domain 3
