@@ -28,19 +28,19 @@ wait "$main"
 code=$?
 main=
 [ $code -eq 0 ] || fail "the first one ended with $code"
-# In the bring-up, when nobody is in OP yet.
-"$ftcs" ethercat run --udp "127.0.0.1:$port" --cycle 4ms --gate 0 --drift-pulses 20000 --lost-frame-limit 1000 --sync-error-limit 0 \
-  --no-motion --duration 3 > "$folder/main.log" 2>&1 &
-main=$!
-for _ in $(seq 50); do grep -q "clocks \.\.\." "$folder/main.log" && break; sleep 0.02; done
-"$ftcs" ethercat scan --udp "0.0.0.0:$port" > "$folder/other.log" 2>&1
-code=$?
-grep -q "al 0x" "$folder/main.log" && late=1 || late=0
-if [ $code -ne 1 ] || ! grep -q "another MainDevice is at work" "$folder/other.log"; then
-  fail "drives that are brought up (the bring-up was over: $late)"
-fi
-wait "$main"
-code=$?
-main=
-[ $code -eq 0 ] || fail "the one whose bring-up was to be disturbed ended with $code"
+# In the bring-up, when nobody is in OP yet. The second one listens for a moment only: a host on which the first one stands
+# still for so long hides it. Three attempts; what is wrong every time is wrong.
+bring_up_is_seen() {
+  "$ftcs" ethercat run --udp "127.0.0.1:$port" --cycle 4ms --gate 0 --drift-pulses 20000 --lost-frame-limit 1000 --sync-error-limit 0 \
+    --no-motion --duration 3 > "$folder/main.log" 2>&1 &
+  main=$!
+  for _ in $(seq 50); do grep -q "clocks \.\.\." "$folder/main.log" && break; sleep 0.02; done
+  "$ftcs" ethercat scan --udp "0.0.0.0:$port" > "$folder/other.log" 2>&1
+  local seen=$? code
+  wait "$main"
+  code=$?
+  main=
+  [ $seen -eq 1 ] && grep -q "another MainDevice is at work" "$folder/other.log" && [ $code -eq 0 ]
+}
+bring_up_is_seen || bring_up_is_seen || bring_up_is_seen || fail "drives that are brought up"
 echo "one main device a wire"
