@@ -225,15 +225,16 @@ std::string ethercat_text(const Json& status) {
                   word(status, "state"), word(status, "servo"), figure(status, "phase_ns") * 1e-3,
                   figure(status, "rate_ppb") * 1e-3, figure(status, "margin_ns") * 1e-3));
   add_sentence(text, status);
-  double furthest_ns = 0.0;
+  double furthest_ns = ServoSnapshot::kUnknown;
   for (const Json& drive : drives) {
-    furthest_ns = std::max(furthest_ns, figure(drive, "system_time_difference_ns"));
+    furthest_ns = std::fmax(furthest_ns, figure(drive, "system_time_difference_ns"));
   }
-  add_line(
-      text, "frames",
-      fmt::format("working counter {:.0f} of {:.0f}, {:.0f} lost; |0x092C| {:.0f} ns at most",
-                  figure(status, "working_counter"), figure(status, "working_counter_expected"),
-                  figure(status, "lost_frames"), furthest_ns));
+  add_line(text, "frames",
+           fmt::format("working counter {:.0f} of {:.0f}, {:.0f} lost; |0x092C| {}",
+                       figure(status, "working_counter"),
+                       figure(status, "working_counter_expected"), figure(status, "lost_frames"),
+                       std::isnan(furthest_ns) ? "not judged"
+                                               : fmt::format("{:.0f} ns at most", furthest_ns)));
   const Json& plant = status.at("plant_time");
   if (!plant.is_object()) return text;
   add_line(text, "plant time",

@@ -52,7 +52,8 @@ void CycleCsv::write(std::uint64_t cycle, const node::CycleNode& node) {
       (node.sample().received - node.sample().sent).ns(), decision.rate.ppb(),
       node.main().last_cycle().working_counter, node.margin_ns(), decision.skipped,
       static_cast<int>(bus.state), bus.dc_to_plant.ns(), bus.sigma_ns, bus.rate_ppb,
-      somebody ? static_cast<int>(drive) : -1, somebody ? node.clocks()[drive].last : 0);
+      somebody ? static_cast<int>(drive) : -1,
+      somebody ? node.clocks()[drive].last.value_or(0) : 0);
   const auto size = static_cast<std::size_t>(end.out - line.data());
   check(std::fwrite(line.data(), 1, size, file_.get()) == size);
 }

@@ -217,8 +217,8 @@ void MainRunner::say_live() {
       figures().margin.quantile(0.5) * 1e-3, name(decision().state), figures().lock_cycle,
       decision().phase_error.ns() * 1e-3, decision().rate.ppm(),
       static_cast<double>(options_.servo.cycle.count()) * 1e-6 / rate, report.working_counter,
-      report.expected, report.states, clocks()[worst].last, worst, main().counters().lost,
-      servo_counters().late);
+      report.expected, report.states, clocks()[worst].last.value_or(0), worst,
+      main().counters().lost, servo_counters().late);
   if (!options_.plant_time.empty()) {
     add(FMT_STRING("bus {:9}  dc to plant {:+12.3f} us (sigma {:.3f})  bus rate {:+9.3f} ppm\n"),
         ftcs::name(bus().state), bus().dc_to_plant.ns() * 1e-3, bus().sigma_ns * 1e-3,

@@ -60,6 +60,27 @@ TEST_P(OnLoopback, the_cyclic_path_touches_no_heap) {
   EXPECT_GT(runner_->figures().working_counter_right, 0U);
 }
 
+// No cycle a second after the lock, and the drives asked in turn: what was not measured is not
+// said to be zero, nor under a bound.
+TEST_P(OnLoopback, a_run_that_ends_at_once_judges_no_clock_of_a_drive) {
+  start();
+  int cycles = 0;
+  runner_->run([&cycles] { return ++cycles > 1; });
+  testing::internal::CaptureStdout();
+  print_run(*runner_);
+  std::fflush(stdout);
+  const std::string said = testing::internal::GetCapturedStdout();
+  EXPECT_NE(said.find("|0x092C|: not judged, there was no cycle a second after the lock"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(said.find("|0x092C| from"), std::string::npos) << said;
+  const Json json = run_json(*runner_);
+  EXPECT_TRUE(json.at("system_time_difference_bound_ns").is_null());
+  for (const Json& drive : json.at("drives")) {
+    EXPECT_TRUE(drive.at("largest_difference_ns").is_null()) << drive.dump();
+  }
+}
+
 TEST(RunHistogram, counts_every_traced_cycle_and_shows_what_is_not_empty) {
   experiment::CycleFigures figures;
   for (int i = 0; i < 10'000; ++i) {

@@ -7,6 +7,10 @@
 
 namespace ftcs::daemon {
 
+Json difference_json(const node::DriveClocks::Seen& clock) {
+  return clock.last ? Json(*clock.last) : Json(nullptr);
+}
+
 namespace {
 
 using ethercat::FailureKind;
@@ -44,7 +48,7 @@ Json drives_json(const MainRunner& runner) {
              {"al_status_code", static_cast<unsigned>(device.code)},
              {"al_status", ethercat::name(device.code)},
              {"propagation_delay_ns", device.propagation_delay},
-             {"system_time_difference_ns", clock.last},
+             {"system_time_difference_ns", difference_json(clock)},
              {"largest_difference_ns", clock.readings > 0 ? Json(clock.largest) : Json(nullptr)},
              {"differences_beyond_limit", clock.beyond}});
   }
@@ -116,7 +120,8 @@ void print_events(const experiment::CycleFigures& figures) {
 void print_clocks(const MainRunner& runner) {
   fmt::print("|0x092C| of each drive, largest:");
   for (std::size_t n = 0; n < runner.main().network().count; ++n) {
-    fmt::print(" {}", runner.clocks()[n].largest);
+    const node::DriveClocks::Seen& clock = runner.clocks()[n];
+    fmt::print(" {}", clock.readings > 0 ? fmt::to_string(clock.largest) : "-");
   }
   fmt::print(" ns\n");
   for (std::size_t n = 0; n < runner.main().network().count; ++n) {

@@ -15,6 +15,8 @@ void print_scan(const ethercat::MainDevice& main);
 /// One or two lines for the user: what failed, where, and what was expected.
 [[nodiscard]] std::string describe(const ethercat::Failure& failure);
 void print_run(const MainRunner& runner);
+/// |0x092C| as it was last; null: nobody asked that drive.
+[[nodiscard]] Json difference_json(const node::DriveClocks::Seen& clock);
 [[nodiscard]] Json run_json(const MainRunner& runner);
 
 }  // namespace ftcs::daemon

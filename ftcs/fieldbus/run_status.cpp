@@ -67,7 +67,7 @@ std::string run_status(const RunOptions& options, const RunSnapshot& snapshot) {
   Json clocks = Json::array();
   for (std::size_t n = 0; n < snapshot.drives; ++n) {
     clocks.push_back(
-        {{"system_time_difference_ns", snapshot.clocks[n].last},
+        {{"system_time_difference_ns", difference_json(snapshot.clocks[n])},
          {"largest_difference_ns",
           snapshot.clocks[n].readings > 0 ? Json(snapshot.clocks[n].largest) : Json(nullptr)},
          {"differences_beyond_limit", snapshot.clocks[n].beyond}});

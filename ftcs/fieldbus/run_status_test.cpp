@@ -63,6 +63,17 @@ TEST_F(RunStatusTest, tells_who_asks_of_plant_time_and_of_the_drives) {
   EXPECT_NE(read->text.find("|0x092C| 17 ns at most"), std::string::npos) << read->text;
 }
 
+// The clocks are asked in turn, one in each cycle.
+TEST_F(RunStatusTest, a_clock_that_nobody_has_looked_at_is_not_said_to_be_right) {
+  const std::string json = run_status(options_, snapshot_);
+  const auto one = read_status(json);
+  EXPECT_NE(json.find("\"system_time_difference_ns\": null"), std::string::npos) << json;
+  EXPECT_NE(one->text.find("|0x092C| 17 ns at most"), std::string::npos) << one->text;
+  snapshot_.clocks[1].last.reset();
+  const auto none = read_status(run_status(options_, snapshot_));
+  EXPECT_NE(none->text.find("|0x092C| not judged"), std::string::npos) << none->text;
+}
+
 TEST_F(RunStatusTest, is_not_locked_before_the_cycle_is) {
   snapshot_.state = CycleState::kAcquiring;
   snapshot_.bus = {};

@@ -10,11 +10,12 @@ void DriveClocks::cycle(const ethercat::MainDevice& main, bool settled,
   const std::uint16_t drive = main.last_cycle().compared;
   if (drive == ethercat::CycleReport::kNobody) return;
   Seen& seen = seen_[drive];
-  seen.last = main.network().devices[drive].system_time_difference;
+  const std::uint32_t now = main.network().devices[drive].system_time_difference;
+  seen.last = now;
   if (!settled) return;
   ++seen.readings;
-  seen.largest = std::max(seen.largest, seen.last);
-  const bool beyond = limit_.count() > 0 && std::int64_t{seen.last} > limit_.count();
+  seen.largest = std::max(seen.largest, now);
+  const bool beyond = limit_.count() > 0 && std::int64_t{now} > limit_.count();
   if (beyond) ++seen.beyond;
   if (beyond != seen.is_beyond) {
     notes.add(beyond ? CycleNote::Kind::kDriveClockOff : CycleNote::Kind::kDriveClockBack, drive);

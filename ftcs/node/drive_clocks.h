@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "ftcs/ethercat/maindevice/main_device.h"
 #include "ftcs/node/cycle_notes.h"
@@ -18,7 +19,7 @@ class DriveClocks {
  public:
   /// Of one drive, ns.
   struct Seen {
-    std::uint32_t last = 0;
+    std::optional<std::uint32_t> last{};  ///< none: it was not looked at yet
     std::uint32_t largest = 0;
     std::uint64_t readings = 0;  ///< that were judged
     std::uint64_t beyond = 0;    ///< of them above the limit
@@ -31,7 +32,7 @@ class DriveClocks {
   /// Once in a cycle, after its frame.
   void cycle(const ethercat::MainDevice& main, bool settled, CycleNotes& notes) noexcept;
   [[nodiscard]] const Seen& operator[](std::size_t drive) const noexcept { return seen_[drive]; }
-  /// Position of the drive that is furthest off at present, of so many.
+  /// Position of the drive that is furthest off at present, of so many; zero: none was looked at.
   [[nodiscard]] std::size_t worst(std::size_t count) const noexcept;
 
  private:
