@@ -70,6 +70,23 @@ TEST_F(BusyDriver, that_is_busy_now_and_then_costs_no_time_and_no_step) {
   EXPECT_NEAR((*end - *start).ns(), passed, 1000.0) << "each change is placed to some nanoseconds";
 }
 
+// Five readings in one call are refused as soon as one of them is.
+TEST_F(BusyDriver, that_is_busy_for_one_call_in_five_is_compared_nine_times_in_ten) {
+  for (const int extended_errno : {0, EOPNOTSUPP}) {
+    kernel.driver_is_busy = nullptr;
+    kernel.extended_errno = extended_errno;
+    auto device = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kRead);
+    ASSERT_TRUE(device.ok());
+    CrossTimestamper comparison(kernel, *device);
+    kernel.busy_by_reading = true;
+    be_busy(0.2);  // before the readings, and with each
+    int failed = 0;
+    for (int i = 0; i < 1000; ++i) failed += comparison.read(5) ? 0 : 1;
+    EXPECT_LT(failed, 100) << name(comparison.method());
+    EXPECT_GT(failed, 0) << "the world is as meant";
+  }
+}
+
 TEST_F(BusyDriver, that_cannot_be_read_for_a_second_does_not_prolong_a_correction) {
   KernelClock clock = make();
   ASSERT_TRUE(clock.apply(correct(30'000.0, 100 * kMillisecond, 5.0)).ok());

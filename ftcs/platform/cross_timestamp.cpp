@@ -17,7 +17,7 @@ std::int64_t nanoseconds(const ptp_clock_time& time) noexcept {
 constexpr int kShortRead = -EPROTO;
 
 // A driver may be held up by firmware or by another processor: asked again at once it mostly
-// answers.
+// answers, and the sooner for fewer readings, each of which may be refused.
 constexpr int kAttempts = 5;
 bool may_pass(int result) noexcept {
   return result == -EBUSY || result == -EAGAIN || result == -EINTR || result == -EIO ||
@@ -83,7 +83,10 @@ CrossTimestamper::Attempt CrossTimestamper::attempt(CrossMethod method,
 CrossTimestamper::Attempt CrossTimestamper::persistently(CrossMethod method,
                                                          unsigned readings) noexcept {
   Attempt made = attempt(method, readings);
-  for (int i = 1; i < kAttempts && may_pass(made.result); ++i) made = attempt(method, readings);
+  for (int i = 1; i < kAttempts && may_pass(made.result); ++i) {
+    readings = std::max(readings / 2, 1U);
+    made = attempt(method, readings);
+  }
   return made;
 }
 

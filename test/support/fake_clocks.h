@@ -68,6 +68,7 @@ class FakeClocks : public FakeKernel {
   int basic_errno = 0;
   bool phc_gone = false;
   std::function<bool()> driver_is_busy;  ///< EBUSY for readings and commands of hardware clocks
+  bool busy_by_reading = false;          ///< in a comparison each reading is one more call of it
   bool short_cross_reads = false;
   bool run_folder_is_writable = true;
   bool device_numbers_known = true;
@@ -227,6 +228,7 @@ class FakeClocks : public FakeKernel {
     auto* answer = static_cast<ptp_sys_offset_extended*>(argument);
     if (short_cross_reads) answer->n_samples = 0;
     for (unsigned i = 0; i < answer->n_samples; ++i) {
+      if (busy_by_reading && is_busy()) return -EBUSY;
       answer->ts[i][0] = time_of(system);
       answer->ts[i][1] = read_over_bus(clock);
       answer->ts[i][2] = time_of(system);
@@ -237,6 +239,7 @@ class FakeClocks : public FakeKernel {
     auto* answer = static_cast<ptp_sys_offset*>(argument);
     if (short_cross_reads) answer->n_samples = 0;
     for (unsigned i = 0; i < answer->n_samples; ++i) {
+      if (busy_by_reading && is_busy()) return -EBUSY;
       answer->ts[2 * i] = time_of(system);
       answer->ts[2 * i + 1] = read_over_bus(clock);
     }
