@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 """ethercat.py build/ftcs [NAME]: what can be wrong on an EtherCAT wire, made with drives in software on loopback. The sentence of
 `ftcs ethercat run` must name cause and remedy and must not say "locked", and its log, its status, the service manager, the page and
-the metrics must all say the same."""
+the metrics must all say the same. On a host that has no time for all cases at once frames are lost in each, and that is then what is
+said: a case that failed beside the others has another attempt by itself."""
 import concurrent.futures
 import json
 import os
@@ -135,11 +136,15 @@ def main():
     cases = [case for case in CASES if len(sys.argv) < 3 or sys.argv[2] in case[0]]
     failures = 0
     with concurrent.futures.ThreadPoolExecutor(len(CASES)) as pool:
-        for case, (wrong, sentence) in zip(cases, pool.map(lambda numbered: examine(ftcs, *numbered), enumerate(cases))):
-            print(f"{'FAILED' if wrong else 'ok':6} {case[0]:30} {case[3]:22} {sentence}", flush=True)
-            for line in wrong:
-                print("       ", line)
-            failures += bool(wrong)
+        answers = list(pool.map(lambda numbered: examine(ftcs, *numbered), enumerate(cases)))
+    for number, (case, (wrong, sentence)) in enumerate(zip(cases, answers)):
+        if wrong:
+            print(f"again  {case[0]}: {'; '.join(wrong[:-1])[:200]}", flush=True)
+            wrong, sentence = examine(ftcs, number, case)
+        print(f"{'FAILED' if wrong else 'ok':6} {case[0]:30} {case[3]:22} {sentence}", flush=True)
+        for line in wrong:
+            print("       ", line)
+        failures += bool(wrong)
     print(f"{len(cases)} cases, {failures} failed")
     return 1 if failures else 0
 

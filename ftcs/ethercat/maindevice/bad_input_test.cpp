@@ -153,6 +153,29 @@ TEST_F(BadInput, a_mailbox_full_of_something_else_does_not_prolong_the_deadline_
   EXPECT_LT((bench_.now() - before).seconds(), 1.5);
 }
 
+// An answer is lost, and then the host stands still for longer than the drive has to answer.
+TEST_F(BadInput, a_host_that_stands_still_for_a_second_asks_for_an_sdo_again) {
+  static constexpr SdoDownload kObject[] = {{{0x6060, 0}, 1, 8}};
+  MainDeviceConfig config;
+  config.clocks.drift_pulses = 10;
+  config.process.objects = kObject;
+  bench_.configure(config);
+  bool stood_still = false;
+  bench_.tamper = [&](const FrameView& frame) {
+    const Datagram datagram = frame[0];
+    if (datagram.command() != Command::kFprd || datagram.data().size() < 64 ||
+        datagram.working_counter() == 0 || stood_still) {
+      return;
+    }
+    stood_still = true;
+    datagram.data()[5] = 0;  // of no protocol: passed over
+    bench_.wait(Nanoseconds{1'200'000'000});
+  };
+  bring_up();
+  EXPECT_TRUE(stood_still);
+  EXPECT_TRUE(bench_.main().cyclic()) << name(bench_.main().failure().kind);
+}
+
 TEST_F(BadInput, a_bring_up_that_takes_too_long_as_a_whole_is_given_up) {
   MainDeviceConfig config;
   config.clocks.drift_pulses = 100'000;  // 20 us each

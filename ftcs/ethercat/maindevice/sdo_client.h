@@ -20,7 +20,8 @@ struct SdoDownload {
 
 /// One SDO at a time: writes the request into the SubDevice's receive mailbox and reads its send
 /// mailbox until the answer is there. An answer to an earlier, repeated request, an emergency and
-/// whatever else comes is passed over; none of it prolongs the deadline.
+/// whatever else comes is passed over; none of it prolongs the deadline, which twenty more frames
+/// follow: whoever stood still in the meantime asks again before it gives up.
 class SdoClient {
  public:
   /// `timeout`: from the first answer of any kind on, in the MainDevice's clock.
@@ -44,6 +45,7 @@ class SdoClient {
   Nanoseconds timeout_{};
   FreeRunningTime deadline_;
   bool deadline_set_ = false;
+  std::uint8_t asked_late_ = 0;  ///< frames since the deadline
   std::uint8_t counter_ = 0;
   std::uint32_t value_ = 0;
 };
