@@ -179,7 +179,7 @@ class Estimator {
   float gain_ = 1.0F;
   float innovation_ = 0.0F;      ///< of the last message
   double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations
-  NoiseModel process_{};         ///< mean of the models' noise under their weights
+  NoiseModel process_{};         ///< mean of the models' noise as far as it is in doubt
   Estimate mixed_{};
 };
 

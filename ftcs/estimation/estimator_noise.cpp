@@ -64,7 +64,9 @@ double Estimator<Grid>::edge_bias_ns(std::size_t side) const noexcept {
 
 template <class Grid>
 void Estimator<Grid>::mix() noexcept {
-  mixed_ = bank_.mixture(weight_, scale_);
+  Row doubt;
+  Evidence<Grid>::lean(weight_, doubt);
+  mixed_ = bank_.mixture(weight_, doubt, scale_);
   const double ahead = edge_bias_ns(0);
   const double back = edge_bias_ns(1);
   if (delay_free()) {
@@ -73,7 +75,7 @@ void Estimator<Grid>::mix() noexcept {
   } else {
     mixed_.x -= ahead - back;
   }
-  process_ = bank_.mean_noise(weight_);
+  process_ = bank_.mean_noise(doubt);
 }
 
 template <class Grid>

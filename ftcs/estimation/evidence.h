@@ -79,9 +79,21 @@ class Evidence {
       store(&weight[i], w);
       sum += w;
     }
-    const double share = 1.0 / total(sum);
-    for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);
+    scale_to_one(weight, total(sum));
     return lane_of(lowest, place, best_cost);
+  }
+
+  /// Writes weights that lean to the wilder models, for the deviation: w_i times Grid::kLean a place, sum
+  /// one. Which of two models that explain the messages alike is right cannot be told, and the
+  /// calmer one is the better bet for the mean; the deviation answers for the other.
+  static void lean(const Row& weight, Row& leaning) noexcept {
+    V sum{};
+    for (std::size_t i = 0; i < kSize; i += kStep) {
+      const V w = load<V>(&weight[i]) * load<V>(&kLeaning[i]);
+      store(&leaning[i], w);
+      sum += w;
+    }
+    scale_to_one(leaning, total(sum));
   }
 
  private:
@@ -97,6 +109,10 @@ class Evidence {
                                            double best) noexcept {
     const std::size_t first = static_cast<std::size_t>(place[0]);
     return lowest[0] == best ? first : static_cast<std::size_t>(place[1]) + 1;
+  }
+  static void scale_to_one(Row& weight, double sum) noexcept {
+    const double share = 1.0 / sum;
+    for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);
   }
   void shrink() noexcept {
     const double keep = kMemory / messages_;
@@ -133,6 +149,18 @@ class Evidence {
       row[i] = (places > 0.0 ? kWildnessCost : kCalmGain) * places;
       if (i == Grid::kFavoured) row[i] -= kFavour;
       if (i == 0) row[i] -= Grid::kCalmFavour;
+    }
+    return row;
+  }
+  ();
+
+  static constexpr Row kLeaning = []() constexpr {
+    Row row{};
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double places = Grid::places_from_start(i);
+      row[i] = 1.0;
+      for (double k = 0.0; k < places; ++k) row[i] *= Grid::kLean;
+      for (double k = 0.0; k > places; --k) row[i] /= Grid::kLean;
     }
     return row;
   }

@@ -228,8 +228,14 @@ void FloorEstimator::choose() noexcept {
   const double product = paths_.forward.variance * paths_.backward.variance;
   scale_ = std::max(least_noise_, std::sqrt(std::sqrt(product)));
   if (evidence_.messages() > 0.0) best_ = evidence_.weigh(weight_);
-  mixed_ = bank_.mixture(weight_, scale_);
-  process_ = bank_.mean_noise(weight_);
+  mix();
+}
+
+void FloorEstimator::mix() noexcept {
+  Evidence<FloorGrid>::Row doubt;
+  Evidence<FloorGrid>::lean(weight_, doubt);
+  mixed_ = bank_.mixture(weight_, doubt, scale_);
+  process_ = bank_.mean_noise(doubt);
 }
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
@@ -281,8 +287,7 @@ void FloorEstimator::adopt(const FloorFit& fit) noexcept {
         1.0 - portable_exp(entries * portable_log(1.0 - fit.noise[direction].share));
     begin_path(paths_[direction], share, std::min(fit.members[direction], 10.0));
   }
-  mixed_ = bank_.mixture(weight_, scale_);
-  process_ = bank_.mean_noise(weight_);
+  mix();
 }
 
 void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,

@@ -109,6 +109,7 @@ class FloorEstimator {
   void detect_changes(const Bank::Innovations& in) noexcept;
   void learn(Path& path, const Bank::Innovations& in) noexcept;
   void choose() noexcept;
+  void mix() noexcept;
   void look() noexcept;
   void adopt(const FloorFit& fit) noexcept;
   void begin(double scale, double wait) noexcept;

@@ -182,10 +182,10 @@ class ModelBank {
     }
   }
 
-  /// Mean of all models under the given weights (sum one), and the covariance
-  /// of that mixture (between-model spread included; ns^2 of it brought to
-  /// units of s^2).
-  [[nodiscard]] Estimate mixture(const Row& weight, double scale) const noexcept {
+  /// Mean of all models under the given weights (sum one), and the mean square about it under those
+  /// of `doubt` (sum one; Evidence::lean()): covariances and the spread between the models (ns^2 of
+  /// it brought to units of s^2).
+  [[nodiscard]] Estimate mixture(const Row& weight, const Row& doubt, double scale) const noexcept {
     V x{}, y{}, d{};
     for (std::size_t i = 0; i < kSize; i += kStep) {
       const V w = load<V>(&weight[i]);
@@ -202,7 +202,7 @@ class ModelBank {
     const double per_s2 = 1.0 / (scale * scale);
     V xx{}, xy{}, xd{}, yy{}, yd{}, dd{};
     for (std::size_t i = 0; i < kSize; i += kStep) {
-      const V w = load<V>(&weight[i]);
+      const V w = load<V>(&doubt[i]);
       if (total(w) == 0.0) continue;
       const ClockState<V> state = pack(i / kStep);
       const V dx = state.x - mean.x;

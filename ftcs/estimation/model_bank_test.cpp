@@ -131,7 +131,7 @@ TEST(ModelBank, mixture_contains_the_spread_between_the_models) {
   bank.set(3, one);
   ModelBank<FullGrid>::Row weight{};
   weight[2] = weight[3] = 0.5;
-  const Estimate mixed = bank.mixture(weight, 2.0);
+  const Estimate mixed = bank.mixture(weight, weight, 2.0);
   EXPECT_DOUBLE_EQ(mixed.x, 20.0);
   EXPECT_DOUBLE_EQ(mixed.xx, 1.0 + 100.0 / 4.0);
 }
