@@ -62,7 +62,7 @@ class EthercatCycleCase {
     main_ = std::make_unique<ethercat::MainDevice>(config);
     segment_ = std::make_unique<ethercat::Segment>();
     for (std::size_t n = 0; n < kDrives; ++n) {
-      crystals_[n].set_rate(Rate::from_ppm(kReference_ppm), {});
+      crystals_[n].set_rate(Rate::from_ppm(kReferencePpm), {});
       static_cast<void>(segment_->add({}, {.parent = static_cast<int>(n) - 1}, crystals_[n]));
     }
     while (!main_->cyclic() && main_->stage() != ethercat::Stage::kStopped) {
@@ -144,7 +144,7 @@ class EthercatCycleCase {
     return ethercat::Bytes{buffer_}.first(size);
   }
 
-  static constexpr double kReference_ppm = 50.0;
+  static constexpr double kReferencePpm = 50.0;
   CycleServo servo_;
   std::vector<ethercat::SdoDownload> objects_;
   std::unique_ptr<ethercat::MainDevice> main_;

@@ -354,6 +354,7 @@ std::optional<std::string> apply_setting(daemon::PtpOptions& options, std::strin
   }
   if (is_fixed_setting(name)) return check_fixed_setting(name, value);
   std::vector<std::string> names;
+  names.reserve(std::size(kSettings));
   for (const PtpSetting& setting : kSettings) names.emplace_back(setting.name);
   return fmt::format("unknown setting '{}'{}", name, did_you_mean(suggestion(name, names)));
 }

@@ -21,13 +21,13 @@ using Json = nlohmann::json;
 /// Another format gets another number; a file with a higher one is of a later program.
 constexpr int kVersion = 1;
 /// Crystals age by some 0.1 ppm a month; after a quarter of a year a guess is as good.
-constexpr std::int64_t kOldest_s = std::int64_t{90} * 86'400;
+constexpr std::int64_t kOldestS = std::int64_t{90} * 86'400;
 /// A crystal that was switched off, or is warmer than before, does not come back closer than this.
 constexpr double kLeastRateSigma = 2e-7;
 /// Between any two crystals; more would be somebody's joke, and the clock starts with it.
 constexpr double kLargestRate = 1e-3;
 /// The year 9999.
-constexpr std::int64_t kLatest_s = 253'402'300'799;
+constexpr std::int64_t kLatestS = 253'402'300'799;
 /// Nobody writes more; a file that is larger is something else.
 constexpr std::size_t kLargestFile = 65'536;
 
@@ -43,9 +43,9 @@ Result<LearntState, std::string> from_json(const Json& json, std::string_view cl
   if (kept_clock != clock)
     return fmt::format("it is of another clock ({}), this is {}", kept_clock, clock);
   const auto saved_at_s = json.at("saved_at_s").get<std::int64_t>();
-  if (saved_at_s < 0 || saved_at_s > kLatest_s) return std::string("its date is impossible");
+  if (saved_at_s < 0 || saved_at_s > kLatestS) return std::string("its date is impossible");
   const std::int64_t age_s = now - saved_at_s;
-  if (age_s > kOldest_s) return fmt::format("it is {} days old", age_s / 86'400);
+  if (age_s > kOldestS) return fmt::format("it is {} days old", age_s / 86'400);
   LearntState learnt{json.at("rate_ppb").get<double>() * 1e-9,
                      json.at("rate_sigma_ppb").get<double>() * 1e-9,
                      json.at("timestamp_noise_ns").get<double>()};

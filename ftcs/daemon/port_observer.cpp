@@ -8,7 +8,7 @@ namespace ftcs::daemon {
 namespace {
 
 // An announcement may be lost; the longest usual interval of Sync is two seconds.
-constexpr double kShortestWindow_s = 5.0;
+constexpr double kShortestWindowS = 5.0;
 constexpr double kAnnounceIntervals = 4.0;
 
 std::uint64_t since(std::uint64_t now, std::uint64_t then) { return now - std::min(now, then); }
@@ -54,7 +54,7 @@ PortObserver::PortObserver(const PtpOptions& options, const ptp::ClockIdentity& 
                            FreeRunningTime start)
     : settings_(port_settings(options)),
       window_(Duration::from_ns(
-          1e9 * std::max(kShortestWindow_s,
+          1e9 * std::max(kShortestWindowS,
                          kAnnounceIntervals * std::exp2(options.protocol.log_announce_interval)))) {
   older_.at = newer_.at = start;
   older_.talkers.set_own(own);

@@ -11,8 +11,8 @@
 namespace ftcs::diagnosis {
 namespace {
 
-constexpr std::int64_t kTaiAheadOfUtc_s = 37;  // since 2017
-constexpr std::int64_t kDay_s = 86'400;        // as --max-first-change
+constexpr std::int64_t kTaiAheadOfUtcS = 37;  // since 2017
+constexpr std::int64_t kDayS = 86'400;        // as --max-first-change
 
 const Talkers& talkers_of(const PortSeen& seen) {
   return seen.on_wire ? *seen.on_wire : seen.at_port;
@@ -36,28 +36,28 @@ std::optional<Finding> arbitrary(const Talker& talker) {
 }
 
 std::optional<Finding> utc_offset(const Talker& talker) {
-  if (!has(talker, ptp::flag::kPtpTimescale) || talker.utc_offset == kTaiAheadOfUtc_s) {
+  if (!has(talker, ptp::flag::kPtpTimescale) || talker.utc_offset == kTaiAheadOfUtcS) {
     return std::nullopt;
   }
   return Finding{
       Cause::kTimescale, fmt::format("the reference announces TAI - UTC = {} s", talker.utc_offset),
-      fmt::format("{} s", kTaiAheadOfUtc_s),
+      fmt::format("{} s", kTaiAheadOfUtcS),
       fmt::format("utc_offset {} at the grandmaster (ptp4l) or its leap second list; ours "
                   "comes from --leapfile",
-                  kTaiAheadOfUtc_s)};
+                  kTaiAheadOfUtcS)};
 }
 
 std::optional<Finding> date_of(const PortSeen& seen, const Talker& talker) {
   if (!seen.utc_s || !talker.shown_s || !has(talker, ptp::flag::kPtpTimescale)) return std::nullopt;
-  const std::int64_t shown = *talker.shown_s - kTaiAheadOfUtc_s;
+  const std::int64_t shown = *talker.shown_s - kTaiAheadOfUtcS;
   const std::int64_t off = shown - *seen.utc_s;
   constexpr std::int64_t kSeconds = 2;
-  if (std::abs(off + kTaiAheadOfUtc_s) < kSeconds) {
+  if (std::abs(off + kTaiAheadOfUtcS) < kSeconds) {
     return Finding{
         Cause::kTimescale, "the reference shows UTC and calls it TAI: it is 37 s behind", "TAI",
         "set the grandmaster's clock 37 s ahead, or have it announce an arbitrary timescale"};
   }
-  if (std::abs(off) < kDay_s) return std::nullopt;
+  if (std::abs(off) < kDayS) return std::nullopt;
   return Finding{
       Cause::kTimescale,
       fmt::format("the reference shows {} UTC, {:+} s from the system clock", date(shown), off),

@@ -57,10 +57,10 @@ class Machine {
   [[nodiscard]] bool bring_up() { return host_.bring_up(); }
 
   void cycle() {
-    constexpr double kLeast_us = 20.0;
-    constexpr double kMost_us = 200.0;
+    constexpr double kLeastUs = 20.0;
+    constexpr double kMostUs = 200.0;
     const double late_us =
-        std::min(kLeast_us + world_.mean_lateness_us * lateness_.exponential(), kMost_us);
+        std::min(kLeastUs + world_.mean_lateness_us * lateness_.exponential(), kMostUs);
     host_.cycle(Duration::from_ns(late_us * 1e3));
   }
 

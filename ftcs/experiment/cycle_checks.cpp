@@ -110,15 +110,15 @@ void add_contour(CycleResult& result, ContourResult contour) {
   };
   constexpr double kMany = 1e9;
   /// Rounding of target and position to counts of 1 um, on two axes.
-  constexpr double kRounding_um = 2.0;
+  constexpr double kRoundingUm = 2.0;
   for (const ContourRow& row : contour.rows) {
     const auto missed = static_cast<double>(row.missed_windows);
     if (row.servo == "no sync") {
       demand(row, "missed SYNC0 windows", 1.0, kMany, missed);
-      demand(row, "contour error, largest / um", kRounding_um, kMany, row.max_um);
+      demand(row, "contour error, largest / um", kRoundingUm, kMany, row.max_um);
     } else {
       demand(row, "missed SYNC0 windows", 0.0, 0.0, missed);
-      demand(row, "contour error, largest / um", 0.0, kRounding_um, row.max_um);
+      demand(row, "contour error, largest / um", 0.0, kRoundingUm, row.max_um);
     }
   }
   result.contour = std::move(contour);

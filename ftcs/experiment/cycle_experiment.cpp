@@ -14,8 +14,8 @@ namespace {
 constexpr int kSettling = 30;
 constexpr int kMeasured = 200;
 constexpr int kConvergenceRun = 120;
-constexpr double kStartError_ns = 300'000.0;
-constexpr double kConverged_ns = 20'000.0;
+constexpr double kStartErrorNs = 300'000.0;
+constexpr double kConvergedNs = 20'000.0;
 /// Main cycles per second: 47 of 21.3 ms fit the printed figures best (20 ms would be 50).
 constexpr double kCyclesPerSecond = 47.0;
 
@@ -116,13 +116,13 @@ void measure(const CycleRow& row, std::uint64_t seed, CycleSeedRun& result, Cycl
 }
 
 void converge(const CycleRow& row, std::uint64_t seed, CycleSeedRun& result) {
-  Run run(row, seed, false, kStartError_ns);
+  Run run(row, seed, false, kStartErrorNs);
   int first_action = -1;
   int settled = 0;
   for (int n = 0; n < kConvergenceRun; ++n) {
     const Run::Step step = run.step();
     if (step.commanded && first_action < 0) first_action = n;
-    if (std::abs(step.perceived_ns) >= kConverged_ns) settled = n + 1;
+    if (std::abs(step.perceived_ns) >= kConvergedNs) settled = n + 1;
   }
   result.cycles = settled - std::max(first_action, 0);
   result.cycles_from_first_message = settled;

@@ -125,8 +125,8 @@ PlantMachine::PlantMachine(const TwoMachinesWorld& world, node::BusMode mode, bo
   host_->set_stamp_noise(
       [this] { return Duration::from_ns(world_.frame_stamp_ns * noise_.normal()); });
   host_->set_stack_delay([this] {
-    constexpr double kLeast_us = 5.0;
-    return Duration::from_ns(1e3 * (kLeast_us + world_.mean_stack_us * noise_.exponential()));
+    constexpr double kLeastUs = 5.0;
+    return Duration::from_ns(1e3 * (kLeastUs + world_.mean_stack_us * noise_.exponential()));
   });
   if (plant) host_->set_plant_clock([this](FreeRunningTime t) { return receiver_.at(t); });
 }
@@ -137,11 +137,11 @@ bool PlantMachine::bring_up() {
 }
 
 void PlantMachine::cycle() {
-  constexpr double kLeast_us = 20.0;
-  constexpr double kMost_us = 200.0;
+  constexpr double kLeastUs = 20.0;
+  constexpr double kMostUs = 200.0;
   receiver_.advance(relabel<TrueTime>(host_->now()));
   const double late_us =
-      std::min(kLeast_us + world_.mean_lateness_us * lateness_.exponential(), kMost_us);
+      std::min(kLeastUs + world_.mean_lateness_us * lateness_.exponential(), kMostUs);
   host_->cycle(Duration::from_ns(late_us * 1e3));
 }
 

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kDrives = 2;
 constexpr int kSegmentPriority = 70;
-constexpr double kReference_ppm = 100.0;  // through SYNC0 within five seconds if nobody follows
-constexpr double kOther_ppm = -80.0;
+constexpr double kReferencePpm = 100.0;  // through SYNC0 within five seconds if nobody follows
+constexpr double kOtherPpm = -80.0;
 constexpr double kSeconds = 12.0;
 constexpr Nanoseconds kGate{500'000};
 constexpr std::uint32_t kDriftPulses = 3000;
@@ -52,7 +52,7 @@ std::optional<std::vector<experiment::ContourRow>> run_live_contours(
   std::vector<experiment::ContourRow> rows;
   SegmentOptions segment_options;
   segment_options.drives = kDrives;
-  segment_options.ppm = {kReference_ppm, kOther_ppm};
+  segment_options.ppm = {kReferencePpm, kOtherPpm};
   for (const Way way : {Way{"no sync", "none"}, Way{"PICS", "pics"}, Way{"FTCS", "ftcs"},
                         Way{"adaptive", "adaptive"}}) {
     if (stop()) break;

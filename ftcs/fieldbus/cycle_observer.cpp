@@ -7,7 +7,7 @@
 namespace ftcs::daemon {
 namespace {
 
-constexpr std::int64_t kWindow_ns = 2'000'000'000;
+constexpr std::int64_t kWindowNs = 2'000'000'000;
 constexpr Nanoseconds kBetweenStates{250'000'000};
 
 WatchMode mode_of(CycleState state) {
@@ -29,7 +29,7 @@ WatchMode mode_of(CycleState state) {
 CycleObserver::CycleObserver(const RunOptions& options)
     : options_(options),
       window_(static_cast<std::uint64_t>(
-          std::max<std::int64_t>(1, kWindow_ns / options.servo.cycle.count()))) {}
+          std::max<std::int64_t>(1, kWindowNs / options.servo.cycle.count()))) {}
 
 std::optional<std::string> CycleObserver::open() {
   if (!options_.watch.is_wanted()) return std::nullopt;

@@ -20,11 +20,11 @@ Plot offset_plot_of(const DemoResult& result) {
   plot.x_label = "Sync message";
   plot.y_label = "|true offset| / ns";
   plot.log_y = true;  // the first millisecond and the last nanoseconds in one picture
-  constexpr double kLeast_ns = 1.0;
+  constexpr double kLeastNs = 1.0;
   for (const experiment::TrialResult& servo : result.servos) {
     std::vector<double> sizes;
     for (const double offset : servo.true_offsets_ns) {
-      sizes.push_back(std::max(std::abs(offset), kLeast_ns));
+      sizes.push_back(std::max(std::abs(offset), kLeastNs));
     }
     plot.series.push_back(trace_series(servo.servo, sizes, 1.0, 1.0));
   }

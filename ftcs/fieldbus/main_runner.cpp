@@ -26,11 +26,11 @@ constexpr Nanoseconds kLineInterval{1'000'000'000};
 /// Longer than another MainDevice waits for the answer of a drive without writing anything.
 constexpr Nanoseconds kListening{100'000'000};
 /// From the request to all drives in OP; a busy host may make them fault some times before.
-constexpr double kOpPatience_s = 30.0;
+constexpr double kOpPatienceS = 30.0;
 /// Without --await-lock so long is waited for plant time.
-constexpr double kPatience_s = 30.0;
+constexpr double kPatienceS = 30.0;
 Nanoseconds plant_time_patience(const RunOptions& options) {
-  const double patience_s = options.await_lock_s > 0.0 ? options.await_lock_s : kPatience_s;
+  const double patience_s = options.await_lock_s > 0.0 ? options.await_lock_s : kPatienceS;
   return Nanoseconds{static_cast<std::int64_t>(patience_s * 1e9)};
 }
 
@@ -60,7 +60,7 @@ node::CycleNodeConfig node_config(const RunOptions& options, bool scan_only) {
   config.supervision.lock_policy = options.lock_policy;
   config.supervision.unlocked_limit = cycles(options.unlocked_limit_s);
   config.supervision.await_limit = cycles(options.await_lock_s);
-  config.supervision.op_limit = cycles(kOpPatience_s);
+  config.supervision.op_limit = cycles(kOpPatienceS);
   config.axes.move = options.move;
   config.axes.radius = options.radius;
   config.axes.turn_s = options.turn_s;

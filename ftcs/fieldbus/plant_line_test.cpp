@@ -13,7 +13,7 @@
 namespace ftcs::daemon {
 namespace {
 
-constexpr double kReading_ns = 125e6;
+constexpr double kReadingNs = 125e6;
 
 FreeRunningTime host(double ns) { return FreeRunningTime{Duration::from_ns(ns)}; }
 ReferenceTime plant(double ns) {
@@ -22,7 +22,7 @@ ReferenceTime plant(double ns) {
 
 void read(PlantLine& line, int from, int to, double ahead_ns = 0.0) {
   for (int i = from; i < to; ++i) {
-    line.add({host(i * kReading_ns), plant(i * kReading_ns) + Duration::from_ns(ahead_ns)});
+    line.add({host(i * kReadingNs), plant(i * kReadingNs) + Duration::from_ns(ahead_ns)});
   }
 }
 
@@ -31,7 +31,7 @@ TEST(PlantLine, knows_plant_time_between_two_readings_and_behind_the_last) {
   EXPECT_FALSE(line.at(host(0.0)));
   read(line, 0, 20);
   for (const double beyond_ns : {-60e6, 0.0, 124e6, 900e6}) {
-    const double instant = 19 * kReading_ns + beyond_ns;
+    const double instant = 19 * kReadingNs + beyond_ns;
     const auto shown = line.at(host(instant));
     ASSERT_TRUE(shown);
     EXPECT_NEAR((*shown - plant(instant)).ns(), 0.0, 2.0) << beyond_ns;
@@ -41,14 +41,14 @@ TEST(PlantLine, knows_plant_time_between_two_readings_and_behind_the_last) {
 TEST(PlantLine, knows_nothing_a_second_after_the_last_reading) {
   PlantLine line;
   read(line, 0, 20);
-  EXPECT_FALSE(line.at(host(19 * kReading_ns + 1.01e9)));
+  EXPECT_FALSE(line.at(host(19 * kReadingNs + 1.01e9)));
 }
 
 TEST(PlantLine, begins_anew_after_a_jump) {
   PlantLine line;
   read(line, 0, 20);
   read(line, 20, 22, 50'000.0);
-  const double instant = 21.5 * kReading_ns;
+  const double instant = 21.5 * kReadingNs;
   ASSERT_TRUE(line.at(host(instant)));
   EXPECT_NEAR((*line.at(host(instant)) - plant(instant)).ns(), 50'000.0, 2.0)
       << "no slope of what was before and after";
@@ -59,7 +59,7 @@ TEST(PlantLine, has_the_slope_of_the_clock_and_not_of_a_burst_of_readings) {
   PlantLine line;
   double worst_ns = 0.0;
   for (int i = 0; i < 20; ++i) {
-    const double burst = i * 2.0 * kReading_ns;
+    const double burst = i * 2.0 * kReadingNs;
     for (int n = 0; n < 12; ++n) {
       const double instant = burst + n * 1e6;
       line.add({host(instant), plant(instant) + Duration::from_ns(n % 12 < 6 ? -200.0 : 200.0)});

@@ -15,28 +15,28 @@
 namespace ftcs::node {
 namespace {
 
-constexpr std::int64_t kCycle_ns = 1'000'000;
-constexpr std::int64_t kStep_ns = 300;
-constexpr double kPlant_ppm = 150.0;
-const Rate kTracking = Rate::from_ppm(kPlant_ppm);
+constexpr std::int64_t kCycleNs = 1'000'000;
+constexpr std::int64_t kStepNs = 300;
+constexpr double kPlantPpm = 150.0;
+const Rate kTracking = Rate::from_ppm(kPlantPpm);
 
 class BridgeClockTest : public ::testing::TestWithParam<bool> {
  protected:
   BridgeClockTest() { clock_.start(is_reference()); }
   [[nodiscard]] static bool is_reference() { return GetParam(); }
   [[nodiscard]] static double plant_ns(double crystal_ns) {
-    return 5e12 + crystal_ns * (1.0 + kPlant_ppm * 1e-6);
+    return 5e12 + crystal_ns * (1.0 + kPlantPpm * 1e-6);
   }
   /// What the terminal shows of the system time when the crystal shows so much.
   [[nodiscard]] static std::uint64_t internal_ns(double crystal_ns) {
-    const double cycles = crystal_ns / kCycle_ns;
-    const double offset = kStep_ns * (is_reference() ? std::ceil(cycles) : cycles);
+    const double cycles = crystal_ns / kCycleNs;
+    const double offset = kStepNs * (is_reference() ? std::ceil(cycles) : cycles);
     return static_cast<std::uint64_t>(std::llround(crystal_ns + offset));
   }
   /// Frame n, and behind it a pair that was latched at this part of the cycle before.
   void frame(std::int64_t n, double part) {
-    clock_.on_frame(LocalTime::from_ns(n * (kCycle_ns + kStep_ns)), n * kStep_ns);
-    const double crystal_ns = kCycle_ns * (static_cast<double>(n) - 1.0 + part);
+    clock_.on_frame(LocalTime::from_ns(n * (kCycleNs + kStepNs)), n * kStepNs);
+    const double crystal_ns = kCycleNs * (static_cast<double>(n) - 1.0 + part);
     toggle_ = !toggle_;
     clock_.on_inputs({toggle_, false, internal_ns(crystal_ns),
                       static_cast<std::uint64_t>(std::llround(plant_ns(crystal_ns)))});
@@ -53,7 +53,7 @@ TEST_P(BridgeClockTest, brings_a_pair_forward_to_the_frame_whatever_the_offset_d
     const auto plant = clock_.plant(kTracking);
     ASSERT_TRUE(plant);
     EXPECT_NEAR(plant->since_epoch().ns() - 5e12,
-                plant_ns(static_cast<double>(n * kCycle_ns)) - 5e12, 2.5)
+                plant_ns(static_cast<double>(n * kCycleNs)) - 5e12, 2.5)
         << n;
   }
 }
@@ -67,8 +67,8 @@ TEST_P(BridgeClockTest, brings_a_pair_forward_that_is_older_than_the_frames_it_r
     const auto plant = clock_.plant(kTracking);
     ASSERT_TRUE(plant);
     EXPECT_NEAR(plant->since_epoch().ns() - 5e12,
-                plant_ns(static_cast<double>(n * kCycle_ns)) - 5e12,
-                is_reference() ? kStep_ns / 2 + 2.5 : 2.5)
+                plant_ns(static_cast<double>(n * kCycleNs)) - 5e12,
+                is_reference() ? kStepNs / 2 + 2.5 : 2.5)
         << n;
   }
 }
@@ -76,19 +76,19 @@ TEST_P(BridgeClockTest, brings_a_pair_forward_that_is_older_than_the_frames_it_r
 TEST_P(BridgeClockTest, goes_on_along_the_crystal_for_a_second_without_new_stamps) {
   for (std::int64_t n = 1; n < 10; ++n) frame(n, 0.5);
   for (std::int64_t n = 10; n < 1000; ++n) {
-    clock_.on_frame(LocalTime::from_ns(n * (kCycle_ns + kStep_ns)), n * kStep_ns);
+    clock_.on_frame(LocalTime::from_ns(n * (kCycleNs + kStepNs)), n * kStepNs);
   }
   const auto plant = clock_.plant(kTracking);
   ASSERT_TRUE(plant);
   EXPECT_NEAR(plant->since_epoch().ns() - 5e12, plant_ns(999e6) - 5e12, 3.0);
   for (std::int64_t n = 1000; n < 1020; ++n) {
-    clock_.on_frame(LocalTime::from_ns(n * (kCycle_ns + kStep_ns)), n * kStep_ns);
+    clock_.on_frame(LocalTime::from_ns(n * (kCycleNs + kStepNs)), n * kStepNs);
   }
   EXPECT_FALSE(clock_.plant(kTracking));
 }
 
 TEST_P(BridgeClockTest, believes_no_stamps_that_stand_still_or_are_of_another_time) {
-  clock_.on_frame(LocalTime::from_ns(kCycle_ns), 0);
+  clock_.on_frame(LocalTime::from_ns(kCycleNs), 0);
   clock_.on_inputs({true, false, 900'000, 77});
   clock_.on_inputs({true, false, 900'000, 77});
   EXPECT_FALSE(clock_.plant(kTracking)) << "no toggle";

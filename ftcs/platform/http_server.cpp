@@ -22,8 +22,8 @@ constexpr std::size_t kWorkers = 8;
 constexpr int kMostWaiting =
     8;  // connections that no worker has time for; further ones are the kernel's
 constexpr int kMostListeners = 4;  // of events: each keeps a worker
-constexpr time_t kPatience_s = 2;
-constexpr time_t kIdle_s = 1;  // a connection that is kept open keeps a worker
+constexpr time_t kPatienceS = 2;
+constexpr time_t kIdleS = 1;  // a connection that is kept open keeps a worker
 
 /// The library's own pool takes whatever comes, a descriptor each.
 class Workers final : public httplib::TaskQueue {
@@ -123,10 +123,10 @@ HttpServer::HttpServer() : implementation_(std::make_unique<Implementation>()) {
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
   });
   server.set_payload_max_length(0);
-  server.set_read_timeout(kPatience_s, 0);
-  server.set_write_timeout(kPatience_s, 0);
+  server.set_read_timeout(kPatienceS, 0);
+  server.set_write_timeout(kPatienceS, 0);
   server.set_keep_alive_max_count(100);
-  server.set_keep_alive_timeout(kIdle_s);
+  server.set_keep_alive_timeout(kIdleS);
   server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     if (request.method == "GET" || request.method == "HEAD") {
       return httplib::Server::HandlerResponse::Unhandled;

@@ -87,14 +87,14 @@ Json world_json(const experiment::ContourResult& contour) {
 }
 
 Plot contour_plot(const char* title, const std::vector<experiment::ContourRow>& rows) {
-  constexpr double kCycle_s = 1e-3;
+  constexpr double kCycleS = 1e-3;
   Plot plot;
   plot.title = title;
   plot.x_label = "s";
   plot.y_label = "um";
   for (const experiment::ContourRow& row : rows) {
     plot.series.push_back(
-        trace_series(row.servo, row.trace_um, experiment::ContourRow::kTraceGroup * kCycle_s, 1.0));
+        trace_series(row.servo, row.trace_um, experiment::ContourRow::kTraceGroup * kCycleS, 1.0));
   }
   plot.note = "Largest of each 20 cycles.";
   return plot;

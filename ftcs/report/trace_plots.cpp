@@ -20,7 +20,7 @@ constexpr double kStartCycles = 60.0;
 /// Bins of a decade of |time error|.
 constexpr double kBinsPerDecade = 12.0;
 /// Below it a time error says nothing: picoseconds of a simulated clock.
-constexpr double kLeastError_ns = 1e-3;
+constexpr double kLeastErrorNs = 1e-3;
 constexpr double kNanosecondsPerSecond = 1e9;
 
 Plot plot_of(const char* title, const char* x, const char* y) {
@@ -49,7 +49,7 @@ PlotSeries start_series(const RunTrace& trace) {
     const double cycle = trace.time_s[i] / trace.interval_s;
     if (cycle > kStartCycles) break;
     series.x.push_back(cycle);
-    series.y.push_back(std::max(std::abs(trace.time_error_ns[i]), kLeastError_ns));
+    series.y.push_back(std::max(std::abs(trace.time_error_ns[i]), kLeastErrorNs));
   }
   return series;
 }
@@ -59,7 +59,7 @@ PlotSeries distribution_series(const RunTrace& trace) {
   const auto errors = measured(trace, trace.time_error_ns);
   std::vector<int> bins;
   for (const double error : errors) {
-    const double size = std::max(std::abs(error), kLeastError_ns);
+    const double size = std::max(std::abs(error), kLeastErrorNs);
     bins.push_back(static_cast<int>(std::floor(std::log10(size) * kBinsPerDecade)));
   }
   PlotSeries series;

@@ -244,9 +244,9 @@ diagnosis::Finding PhcRunner::finding(bool follows) const {
 }
 
 void PhcRunner::publish(std::int64_t raw_ns, bool follows) {
-  constexpr std::int64_t kBetween_ns = 250'000'000;
+  constexpr std::int64_t kBetweenNs = 250'000'000;
   if (!observers_ || raw_ns < next_state_ns_) return;
-  next_state_ns_ = raw_ns + kBetween_ns;
+  next_state_ns_ = raw_ns + kBetweenNs;
   WatchState state =
       watch_state(discipline(), servo_kind_name(options_.servo.kind), finding(follows));
   state.kind.set("phc");

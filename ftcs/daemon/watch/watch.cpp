@@ -162,13 +162,13 @@ void Watch::attend() {
 
 /// Of all points of a twentieth of a second the one that is farthest off is shown.
 void Watch::drain() {
-  constexpr double kShortest_s = 0.02;
+  constexpr double kShortestS = 0.02;
   state_ = feed_.state();
   std::vector<WatchPoint> shown;
   WatchPoint point;
   while (feed_.next(point)) {
     history_.add(point);
-    const bool same = !shown.empty() && point.time_s - shown.back().time_s < kShortest_s &&
+    const bool same = !shown.empty() && point.time_s - shown.back().time_s < kShortestS &&
                       shown.back().used == point.used;
     if (!same) {
       shown.push_back(point);

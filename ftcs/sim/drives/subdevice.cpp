@@ -71,11 +71,11 @@ void SubDevice::advance(WireTime now) noexcept {
 
 /// A bridge terminal has a pace of its own: each millisecond, wherever the frames are.
 void SubDevice::latch_both_sides(WireTime now) noexcept {
-  constexpr std::int64_t kPace_ns = 1'000'000;
-  const std::int64_t number = now.since_epoch().floor_ns() / kPace_ns;
+  constexpr std::int64_t kPaceNs = 1'000'000;
+  const std::int64_t number = now.since_epoch().floor_ns() / kPaceNs;
   if (number == latches_) return;
   latches_ = number;
-  const auto instant = WireTime::from_ns(number * kPace_ns);
+  const auto instant = WireTime::from_ns(number * kPaceNs);
   drive_.show_stamps(dc_.system_time(instant), config_.other_side->system_time(instant));
 }
 
