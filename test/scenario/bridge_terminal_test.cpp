@@ -20,8 +20,8 @@ namespace {
 using ethercat::FailureKind;
 using ethercat::WireTime;
 
-constexpr std::int64_t kSomeDay_ns = 850'000'000'000'000'000;  // 2026, on the epoch of 2000
-constexpr int kSecond = 1000;                                  // cycles
+constexpr std::int64_t kSomeDayNs = 850'000'000'000'000'000;  // 2026, on the epoch of 2000
+constexpr int kSecond = 1000;                                 // cycles
 
 /// Another segment: its reference clock, of 10 ns ticks, some ppm off.
 class PlantSegment final : public ethercat::OtherSide {
@@ -29,7 +29,7 @@ class PlantSegment final : public ethercat::OtherSide {
   explicit PlantSegment(double ppm) : crystal_(Rate::from_ppm(ppm)) {}
   [[nodiscard]] std::optional<std::uint64_t> system_time(WireTime instant) noexcept override {
     if (!connected_) return std::nullopt;
-    const std::int64_t shown = kSomeDay_ns + step_ns_ + crystal_.reading(instant).floor_ns();
+    const std::int64_t shown = kSomeDayNs + step_ns_ + crystal_.reading(instant).floor_ns();
     return static_cast<std::uint64_t>(shown - shown % 10);
   }
   void connect(bool connected) { connected_ = connected; }
@@ -84,7 +84,7 @@ class WithABridge : public ::testing::Test {
   [[nodiscard]] double error_ns(std::size_t position) {
     const WireTime instant = host_->instant_of(node().decision().wake) + Duration::from_ns(0.5e6);
     const auto shown = static_cast<std::int64_t>((*segment_)[position].dc().system_time(instant));
-    return static_cast<double>(shown - kSomeDay_ns) - plant_->exact_ns(instant);
+    return static_cast<double>(shown - kSomeDayNs) - plant_->exact_ns(instant);
   }
   void expect_unharmed() {
     for (std::size_t n = 0; n < segment_->size(); ++n) {
@@ -168,6 +168,36 @@ TEST_F(WithABridge, that_has_no_other_side_ends_the_bring_up) {
   EXPECT_FALSE(host_->bring_up());
   EXPECT_EQ(node().main().failure().kind, FailureKind::kBridgeSilent);
   EXPECT_EQ(node().main().failure().position, 2);
+}
+
+// A pair of before the gap is of another time: the other side may have been set in the meantime.
+TEST_F(WithABridge, that_was_alone_is_believed_after_two_pairs_of_afterwards) {
+  constexpr std::uint64_t kHour = 3'600'000'000'000;
+  struct Shown {
+    bool updated, alone;
+    std::uint64_t ahead;
+  };
+  const std::array kShown{Shown{false, false, kHour}, Shown{false, true, kHour},
+                          Shown{true, false, kHour}, Shown{false, false, 2 * kHour}};
+  build(0, 8);
+  power_on();
+  std::size_t next = 0;
+  host_->set_way_back([&](const ethercat::FrameView& frame) {
+    const ethercat::Datagram inputs = frame[0];
+    if (inputs.command() != ethercat::Command::kFprd ||
+        inputs.data().size() != ethercat::bridge::kInputSize) {
+      return true;
+    }
+    const Shown shown = kShown[std::min(next++, kShown.size() - 1)];
+    const unsigned flags = (shown.updated ? 0x40U : 0U) | (shown.alone ? 0x80U : 0U);
+    inputs.data()[1] = static_cast<std::uint8_t>(flags);
+    ethercat::store<std::uint64_t>(inputs.data(), 2, 0);
+    ethercat::store<std::uint64_t>(inputs.data(), 10, shown.ahead);
+    return true;
+  });
+  ASSERT_TRUE(host_->bring_up()) << name(node().main().failure().kind);
+  EXPECT_EQ(next, kShown.size());
+  EXPECT_GT((*segment_)[1].dc().system_time(host_->now()), 2 * kHour);
 }
 
 TEST_F(WithABridge, that_is_not_on_the_wire_is_refused) {
