@@ -182,14 +182,8 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   if (reports) end_with(reports->message, kRuntimeError);
   if (runner.main().failure()) return end_with(runner.main().failure(), options);
   if (csv || reports || !printed) return kRuntimeError;
-  const std::string_view sentence = runner.sentence();
-  if (!sentence.starts_with("locked")) end_with(std::string(sentence), kNotLocked);
-  if (runner.decision().state != CycleState::kLocked) return kNotLocked;
-  const ethercat::CycleReport& last = runner.main().last_cycle();
-  if (last.working_counter < last.whole || runner.seen().axes_in_fault > 0) return kNotLocked;
-  if (last.all_operational()) return kSuccess;
-  return end_with("not every drive was in OP at the end: the lines above and --json tell which",
-                  kNotLocked);
+  const int code = exit_code_of(runner.seen());
+  return code == kSuccess ? code : end_with(std::string(runner.sentence()), code);
 }
 
 }  // namespace
@@ -212,6 +206,11 @@ std::optional<std::string> check_drive_sync(const RunOptions& options) {
     }
   }
   return std::nullopt;
+}
+
+int exit_code_of(const diagnosis::CycleSeen& seen) noexcept {
+  if (seen.failure != ethercat::FailureKind::kNone) return kRuntimeError;
+  return diagnosis::cause_of(seen) == diagnosis::Cause::kLocked ? kSuccess : kNotLocked;
 }
 
 int scan_ethercat(platform::Kernel& kernel, const RunOptions& options) {

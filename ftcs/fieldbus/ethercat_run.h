@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "ftcs/diagnosis/cycle_diagnosis.h"
 #include "ftcs/fieldbus/run_options.h"
 #include "ftcs/platform/kernel.h"
 
@@ -15,6 +16,10 @@ namespace ftcs::daemon {
 /// `ftcs ethercat run`: plant time, drives, cycles, figures and files. Can the files of the options
 /// be written, is asked before.
 [[nodiscard]] int run_ethercat(platform::Kernel& kernel, const RunOptions& options);
+
+/// Of a run that ended so: zero only where its sentence (diagnosis::write_sentence) begins with
+/// "locked".
+[[nodiscard]] int exit_code_of(const diagnosis::CycleSeen& seen) noexcept;
 
 /// Shifts of SYNC0 and SYNC1 are within a cycle, which is known when all options are; one sentence
 /// if one is not.

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#include "ftcs/fieldbus/ethercat_run.h"
+
+#include <array>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "ftcs/daemon/exit_code.h"
+
+namespace ftcs::daemon {
+namespace {
+
+using diagnosis::CycleSeen;
+
+CycleSeen good() {
+  CycleSeen seen;
+  seen.state = CycleState::kLocked;
+  seen.drives = seen.expected_drives = 8;
+  seen.working_counter = seen.expected_counter = 24;
+  seen.cycles = 1000;
+  seen.margin_ns = 400e3;
+  seen.cycle_ns = 1e6;
+  return seen;
+}
+
+// Whatever else was seen, a script that reads the code and a person who reads the sentence are told
+// the same.
+TEST(EthercatRun, exit_code_zero_and_the_word_locked_go_together) {
+  for (unsigned bits = 0; bits < 1U << 9U; ++bits) {
+    const auto chosen = [bits](unsigned n) { return (bits >> n & 1U) != 0; };
+    CycleSeen seen = good();
+    if (chosen(0)) seen.state = CycleState::kCoasting;
+    if (chosen(1)) seen.failure = ethercat::FailureKind::kLinkLost;
+    if (chosen(2)) seen.has_reference = false;
+    if (chosen(3)) seen.lost = 200;
+    if (chosen(4)) seen.late = 200;
+    if (chosen(5)) seen.margin_ns = 20e3;
+    if (chosen(6)) seen.working_counter = 21;
+    if (chosen(7)) seen.operational = false;
+    if (chosen(8)) seen.axes_in_fault = 1;
+    std::array<char, 480> text{};
+    const std::string sentence(diagnosis::write_sentence(text, seen));
+    EXPECT_EQ(exit_code_of(seen) == kSuccess, sentence.starts_with("locked: ")) << sentence;
+    EXPECT_EQ(exit_code_of(seen), bits == 0   ? kSuccess
+                                  : chosen(1) ? kRuntimeError
+                                              : kNotLocked)
+        << sentence;
+  }
+}
+
+}  // namespace
+}  // namespace ftcs::daemon
