@@ -22,14 +22,17 @@ namespace ftcs {
   return reference.inverse(ReferenceTime{command.correction_time}).since_epoch();
 }
 
+/// Both rates are numbers, and none of them infinite.
+[[nodiscard]] inline bool is_finite(const ServoCommand& command) noexcept {
+  return std::isfinite(command.correction_rate.ratio()) &&
+         std::isfinite(command.tracking_rate.ratio());
+}
+
 /// Why a clock with these limits must refuse the command; no value: it may take it. A correction
 /// rate that will not be used may be anything finite.
 [[nodiscard]] inline std::optional<ClockError> find_error(const ServoCommand& command,
                                                           const RateLimits& limits) noexcept {
-  if (!std::isfinite(command.correction_rate.ratio()) ||
-      !std::isfinite(command.tracking_rate.ratio())) {
-    return ClockError::kNotFinite;
-  }
+  if (!is_finite(command)) return ClockError::kNotFinite;
   if (!limits.contains(command.tracking_rate)) return ClockError::kRateOutOfLimits;
   if (has_correction(command) && !limits.contains(command.correction_rate)) {
     return ClockError::kRateOutOfLimits;

@@ -59,8 +59,9 @@ struct ServoTraits {
 ///     step       |offset| > threshold and permitted: step = -offset, at the tracking rate, unless
 ///                the servo decides steps; permitted otherwise: as the servo asks; else none
 ///     rate       |change| <= largest_rate_change, at the command and at the end of its correction
-///     limits     slowest <= rate <= fastest, of servo and clock together; not a number: 1
-///     clock      apply(); on its error the last command stays in force
+///     limits     slowest <= rate <= fastest, of servo and clock together
+///     clock      apply(), which refuses what is not a number or infinite (kNotFinite); on its
+///                error the last command stays in force
 ///
 /// Of one servo, chosen by the program: nothing of any other is linked. ClockDiscipline has the
 /// one that its configuration names.
@@ -128,7 +129,7 @@ class BasicClockDiscipline {
   [[nodiscard]] bool locked() const noexcept {
     return lock_.locked() && !in_holdover_ && path_delay_known();
   }
-  /// It is configured, or this reference has answered.
+  /// It is configured, or this reference has answered and the servo made a delay of it.
   [[nodiscard]] bool path_delay_known() const noexcept {
     return traits_.path_delay_is_fixed || path_delay_measured_;
   }
@@ -144,6 +145,7 @@ class BasicClockDiscipline {
   [[nodiscard]] ServoCommand within_limits(ServoCommand command) noexcept;
   [[nodiscard]] bool at_limit(const ServoCommand& command) const noexcept;
   [[nodiscard]] bool refuses(Duration offset) const noexcept;
+  [[nodiscard]] bool servo_knows_path_delay() const noexcept;
   const Telemetry& finish() noexcept;
   [[nodiscard]] ServoSnapshot known(ServoSnapshot snapshot) const noexcept;
   [[nodiscard]] Duration slew_time(Duration jump) const noexcept;
@@ -156,6 +158,7 @@ class BasicClockDiscipline {
   Servo servo_;
   LockDetector lock_;
   RateChangeLimit rate_change_;
+  bool answered_ = false;  ///< a backward message of this reference was used
   bool path_delay_measured_ = false;
   bool first_command_ = true;
   bool in_holdover_ = false;

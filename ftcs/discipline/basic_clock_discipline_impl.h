@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "ftcs/clock/command_check.h"
 #include "ftcs/discipline/basic_clock_discipline.h"
 
 namespace ftcs {
@@ -32,7 +33,8 @@ Telemetry BasicClockDiscipline<Servo>::on_pair(const EventPair& event, bool pace
   telemetry_.direction = event.direction;
   telemetry_.verdict = update.verdict;
   const bool used = update.verdict == SampleVerdict::kUsed;
-  if (used && event.direction == Direction::kBackward) path_delay_measured_ = true;
+  answered_ = answered_ || (used && event.direction == Direction::kBackward);
+  path_delay_measured_ = answered_ && servo_knows_path_delay();
   telemetry_.servo = known(servo_.snapshot());
   if (used && !paces) {
     ++counters_.beside;
@@ -73,7 +75,7 @@ void BasicClockDiscipline<Servo>::on_new_reference() noexcept {
   sync_interval_.forget_gap();
   announced_interval_ = Duration{};
   in_holdover_ = false;
-  path_delay_measured_ = false;
+  answered_ = path_delay_measured_ = false;
   ++counters_.new_references;
   telemetry_.servo = known(servo_.snapshot());
   finish();
@@ -237,6 +239,7 @@ ServoCommand BasicClockDiscipline<Servo>::with_step(ServoCommand command,
 
 template <ClockServo Servo>
 ServoCommand BasicClockDiscipline<Servo>::within_limits(ServoCommand command) noexcept {
+  if (!is_finite(command)) return command;  // no limit makes it one: the clock refuses it
   rate_change_.begin(clock_, telemetry_.reading.free_running);
   command = rate_change_.limited(command, telemetry_.reading.free_running);
   command.tracking_rate = limits_.clamp(command.tracking_rate);
@@ -250,6 +253,13 @@ bool BasicClockDiscipline<Servo>::at_limit(const ServoCommand& command) const no
     return rate == limits_.slowest || rate == limits_.fastest;
   };
   return at_edge(command.correction_rate) || at_edge(command.tracking_rate);
+}
+
+// An answer may be kept for the next Sync, or tell an impossible delay there.
+template <ClockServo Servo>
+bool BasicClockDiscipline<Servo>::servo_knows_path_delay() const noexcept {
+  if constexpr (requires { servo_.path_delay_known(); }) return servo_.path_delay_known();
+  return true;
 }
 
 template <ClockServo Servo>

@@ -6,6 +6,7 @@
 #include "ftcs/discipline/clock_discipline.h"
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -507,6 +508,63 @@ TEST_F(ClockDisciplineTest, without_a_measured_path_delay_it_steers_but_is_not_l
   discipline_->on_new_reference();
   for (int n = 0; n < 40; ++n) telemetry = sync_and_wait();
   EXPECT_FALSE(telemetry.locked) << "another reference has another path";
+}
+
+TEST_F(ClockDisciplineTest, an_answer_makes_the_path_delay_known_once_an_exchange_is_whole) {
+  DisciplineConfig config = config_for(ServoKind::kFtcs);
+  config.servo.two_way.fixed_path_delay.reset();
+  start(Duration{}, config);
+  const auto answered = [&] {
+    return discipline_->on_pair({Direction::kBackward, reference(), oscillator_.now()});
+  };
+  EXPECT_EQ(answered().verdict, SampleVerdict::kRejected) << "of which Sync?";
+  EXPECT_FALSE(discipline_->path_delay_known());
+  sync_and_wait();
+  EXPECT_EQ(answered().verdict, SampleVerdict::kUsed);
+  EXPECT_FALSE(discipline_->path_delay_known()) << "one Sync tells no rate: it is kept";
+  sync_and_wait();
+  EXPECT_TRUE(discipline_->path_delay_known());
+  discipline_->on_new_reference();
+  EXPECT_FALSE(discipline_->path_delay_known());
+}
+
+TEST_F(ClockDisciplineTest, a_rate_that_is_no_number_is_refused_and_the_last_one_stays) {
+  for (const double largest_rate_change : {0.0, 1e-3}) {
+    DisciplineConfig config = config_for(ServoKind::kFtcs);
+    config.largest_rate_change = largest_rate_change;
+    start(Duration{}, config);
+    ASSERT_FALSE(discipline_->start_at(Rate::from_ppm(20.0)));
+    for (const double ratio :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+          -std::numeric_limits<double>::infinity()}) {
+      EXPECT_EQ(discipline_->start_at(Rate::from_ratio(ratio)), ClockError::kNotFinite);
+      const LocalTime before = clock_->read().local;
+      advance(Nanoseconds{1s});
+      EXPECT_NEAR((clock_->read().local - before).ns(), 1e9 + 20e3, 0.01);
+    }
+  }
+}
+
+/// Of somebody who divides by an interval of zero.
+struct ServoWithoutANumber {
+  ServoUpdate update(const TimestampPair&, const ClockReading&) noexcept {
+    const Rate nothing = Rate::from_ratio(std::numeric_limits<double>::quiet_NaN());
+    return {SampleVerdict::kUsed, true, {nothing, Duration{}, nothing, Duration{}}};
+  }
+  void reset() noexcept {}
+  [[nodiscard]] ServoSnapshot snapshot() const noexcept { return {}; }
+};
+
+TEST_F(ClockDisciplineTest, a_servo_that_commands_no_number_is_told_so_and_moves_nothing) {
+  start(Duration{}, config_for(ServoKind::kFtcs));
+  BasicClockDiscipline<ServoWithoutANumber> discipline(
+      {}, {}, *clock_, [](const RateLimits&) { return ServoWithoutANumber{}; });
+  ASSERT_FALSE(discipline.start_at(Rate::from_ppm(20.0)));
+  const Telemetry telemetry = discipline.on_pair(forward());
+  EXPECT_EQ(telemetry.error, ClockError::kNotFinite);
+  EXPECT_FALSE(telemetry.commanded);
+  EXPECT_EQ(discipline.counters().apply_errors, 1U);
+  EXPECT_EQ(discipline.counters().commands, 0U);
 }
 
 TEST_F(ClockDisciplineTest, a_path_delay_that_is_given_to_the_servo_itself_is_known) {

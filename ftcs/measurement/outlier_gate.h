@@ -9,15 +9,23 @@
 
 namespace ftcs {
 
-/// Nothing is checked: a warm_up above kMemory never ends, so that all is accepted, and
-/// rejections_to_exit of zero works as 1.
+/// What is not valid() works all the same: a warm_up above kMemory as kMemory, rejections_to_exit
+/// of zero as 1.
 struct OutlierGateConfig {
+  static constexpr std::size_t kMemory = 32;  ///< innovations that the gate remembers
+
   double width = 6.0;  ///< accepted distance from the usual, in robust standard deviations; > 0
-  std::size_t warm_up = 8;  ///< innovations that are accepted unseen; at most OutlierGate::kMemory
+  std::size_t warm_up = 8;  ///< innovations that are accepted unseen; at most kMemory
   std::size_t rejections_to_exit =
       5;  ///< so many in a row are no outliers but the truth; at least 1
   Nanoseconds resolution{
-      1};  ///< of the timestamps: no spread is smaller (all innovations may be equal)
+      1};  ///< of the timestamps: no spread is smaller (all innovations may be equal); above 0
+
+  [[nodiscard]] constexpr bool valid() const noexcept {
+    constexpr double kWidest = 1e9;  // also: not infinite, and a number
+    return width > 0.0 && width < kWidest && warm_up <= kMemory && rejections_to_exit >= 1 &&
+           resolution > Nanoseconds{0};
+  }
 };
 
 enum class GateDecision : std::uint8_t {
@@ -47,7 +55,7 @@ struct GateCounters {
 /// out 2e-9 of normal noise. A decision costs two medians of 32 values (see order_statistic()).
 class OutlierGate {
  public:
-  static constexpr std::size_t kMemory = 32;
+  static constexpr std::size_t kMemory = OutlierGateConfig::kMemory;
 
   explicit OutlierGate(const OutlierGateConfig& config = {}) noexcept : config_(config) {}
 
@@ -62,7 +70,7 @@ class OutlierGate {
   }
 
   /// Enough was heard to judge by.
-  [[nodiscard]] bool warm() const noexcept { return size_ >= config_.warm_up; }
+  [[nodiscard]] bool warm() const noexcept { return size_ >= config_.warm_up || size_ == kMemory; }
   /// Learnt standard deviation in nanoseconds; the resolution until something was learnt.
   [[nodiscard]] double spread_ns() const noexcept;
   [[nodiscard]] const GateCounters& counters() const noexcept { return counters_; }

@@ -209,6 +209,23 @@ TEST(OutlierGate, reset_forgets_all_but_the_counters) {
   EXPECT_EQ(decide(gate, 2e6), GateDecision::kExit);
 }
 
+TEST(OutlierGate, its_warm_up_ends_with_its_memory_at_the_latest) {
+  OutlierGate gate{{.warm_up = 1000}};
+  Noise noise(8);
+  for (std::size_t i = 0; i < OutlierGate::kMemory; ++i) (void)decide(gate, noise());
+  EXPECT_TRUE(gate.warm());
+  EXPECT_EQ(decide(gate, 1e6), GateDecision::kReject);
+}
+
+TEST(OutlierGateConfig, tells_what_cannot_be_meant) {
+  EXPECT_TRUE(OutlierGateConfig{}.valid());
+  EXPECT_FALSE(OutlierGateConfig{.width = 0.0}.valid());
+  EXPECT_FALSE(OutlierGateConfig{.width = std::numeric_limits<double>::quiet_NaN()}.valid());
+  EXPECT_FALSE(OutlierGateConfig{.warm_up = 33}.valid());
+  EXPECT_FALSE(OutlierGateConfig{.rejections_to_exit = 0}.valid());
+  EXPECT_FALSE(OutlierGateConfig{.resolution = Nanoseconds{0}}.valid());
+}
+
 TEST(OutlierGate, survives_the_extremes_without_allocation) {
   OutlierGate gate;
   const test::ForbidAllocation guard;

@@ -12,8 +12,8 @@
 
 namespace ftcs {
 
-/// How path delays are measured and filtered. Valid: lowest <= highest, unchecked; else every raw
-/// delay is refused.
+/// How path delays are measured and filtered. Unless valid(), every raw delay is refused, or the
+/// filter takes another length.
 struct PathDelayConfig {
   DelayFilterConfig filter{};
   Nanoseconds asymmetry{};  ///< delayAsymmetry, IEEE 1588-2019, 7.4.2: positive when reference to
@@ -24,6 +24,10 @@ struct PathDelayConfig {
   Nanoseconds lowest{-1'000};
   /// Above it a delay is absurd: 100 ms is 20,000 km of fibre.
   Nanoseconds highest{100'000'000};
+
+  [[nodiscard]] constexpr bool valid() const noexcept {
+    return lowest <= highest && filter.length >= 1 && filter.length <= DelayFilter::kCapacity;
+  }
 };
 
 /// What became of a backward message.

@@ -23,6 +23,12 @@ AdaptiveConfig with_common(AdaptiveConfig servo, const ServoConfig& common) noex
   return servo;
 }
 
+std::optional<ServoConfigError> validate(const ExternalConfig& servo) noexcept {
+  if (servo.functions == nullptr || servo.instance == nullptr) return ServoConfigError::kExternal;
+  if (!servo.fixed_path_delay && !servo.path_delay.valid()) return ServoConfigError::kPathDelay;
+  return std::nullopt;
+}
+
 /// Of servos that hear both directions themselves and may be told the delay instead.
 template <class PairServoConfig>
 PairServoConfig with_delay(PairServoConfig servo, const ServoConfig& common) noexcept {
@@ -56,31 +62,33 @@ std::optional<ServoKind> servo_kind_from_name(std::string_view name) noexcept {
 
 std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept {
   if (!config.limits.valid()) return ServoConfigError::kRateLimits;
+  const auto classic = [&config](const auto& law) {
+    const auto wrong = validate(law);
+    return wrong ? wrong : validate(config.two_way);
+  };
   switch (config.kind) {
     case ServoKind::kFtcs:
-      return validate(with_common(config.ftcs, config));
+      return classic(with_common(config.ftcs, config));
     case ServoKind::kPics:
-      return validate(with_common(config.pics, config));
+      return classic(with_common(config.pics, config));
     case ServoKind::kLinuxptpPi:
-      return validate(with_common(config.linuxptp_pi, config));
+      return classic(with_common(config.linuxptp_pi, config));
     case ServoKind::kFreeRunning:
-      return validate(config.free_running);
+      return classic(config.free_running);
     case ServoKind::kAdaptive:
       return validate(with_common(config.adaptive, config));
     case ServoKind::kRegression:
-      return validate(with_common(config.regression, config));
+      return classic(with_common(config.regression, config));
     case ServoKind::kPid:
-      return validate(with_common(config.pid, config));
+      return classic(with_common(config.pid, config));
     case ServoKind::kFrequencyCompensated:
-      return validate(with_common(config.frequency_compensated, config));
+      return classic(with_common(config.frequency_compensated, config));
     case ServoKind::kKalman:
       return validate(with_delay(config.kalman, config));
     case ServoKind::kMinimumDelay:
       return validate(with_delay(config.minimum_delay, config));
     case ServoKind::kExternal:
-      return config.external.functions != nullptr && config.external.instance != nullptr
-                 ? std::nullopt
-                 : std::optional{ServoConfigError::kExternal};
+      return validate(with_common(config.external, config));
   }
   return std::nullopt;
 }
@@ -145,6 +153,15 @@ void AnyServo::on_new_epoch() noexcept {
         } else {
           servo.reset();
         }
+      },
+      servo_);
+}
+
+bool AnyServo::path_delay_known() const noexcept {
+  return ftcs::visit(
+      [](const auto& servo) noexcept {
+        if constexpr (requires { servo.path_delay_known(); }) return servo.path_delay_known();
+        return true;
       },
       servo_);
 }

@@ -86,8 +86,8 @@ struct ServoConfig {
 };
 
 /// The first thing that is wrong with the common limits or the chosen kind, with the common
-/// settings filled in; no value: make_servo() may be called. Other kinds' settings and two_way are
-/// not looked at.
+/// settings filled in, or with what the kind takes of two_way; no value: make_servo() may be
+/// called. Other kinds' settings are not looked at.
 [[nodiscard]] std::optional<ServoConfigError> validate(const ServoConfig& config) noexcept;
 
 /// Any servo as one value, chosen at run time: a closed set, so no virtual functions and no heap.
@@ -118,6 +118,8 @@ class AnyServo {
   void on_step(Duration step) noexcept;
   /// A clock was set back: on_new_epoch() of the servo, or reset() where it has none.
   void on_new_epoch() noexcept;
+  /// False: the servo has heard no answer, or made no path delay of it yet.
+  [[nodiscard]] bool path_delay_known() const noexcept;
   /// AdaptiveServo::free_path_delay(); nothing where the servo has none.
   void free_path_delay(double sigma_ns) noexcept;
   [[nodiscard]] ServoSnapshot snapshot() const noexcept;

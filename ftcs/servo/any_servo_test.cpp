@@ -200,8 +200,31 @@ TEST(ServoConfig, is_validated_for_the_chosen_kind_only) {
   EXPECT_EQ(validate(config), ServoConfigError::kRateLimits);
 }
 
+// What a kind does not take of two_way cannot be wrong for it.
+TEST(ServoConfig, the_part_in_front_of_a_law_is_validated_with_it) {
+  for (const ServoKindName& entry : kServoKinds) {
+    const bool alone = entry.kind == ServoKind::kAdaptive || entry.kind == ServoKind::kKalman ||
+                       entry.kind == ServoKind::kMinimumDelay;
+    const auto wrong_if = [alone](ServoConfigError error) {
+      return alone ? std::nullopt : std::optional{error};
+    };
+    ServoConfig config;
+    config.kind = entry.kind;
+    config.two_way.gate.warm_up = OutlierGate::kMemory + 1;
+    EXPECT_EQ(validate(config), wrong_if(ServoConfigError::kOutlierGate)) << entry.name;
+    config.two_way.gate_enabled = false;
+    EXPECT_EQ(validate(config), std::nullopt) << entry.name;
+    config.two_way.path_delay.lowest = config.two_way.path_delay.highest + 1ns;
+    EXPECT_EQ(validate(config), wrong_if(ServoConfigError::kPathDelay)) << entry.name;
+    config.two_way.path_delay = {.filter = {.length = 0}};
+    EXPECT_EQ(validate(config), wrong_if(ServoConfigError::kPathDelay)) << entry.name;
+    config.two_way.fixed_path_delay = 10us;
+    EXPECT_EQ(validate(config), std::nullopt) << entry.name;
+  }
+}
+
 TEST(ServoConfigError, every_error_has_its_own_sentence) {
-  for (int a = 0; a <= static_cast<int>(ServoConfigError::kStepThreshold); ++a) {
+  for (int a = 0; a <= static_cast<int>(ServoConfigError::kOutlierGate); ++a) {
     EXPECT_NE(describe(static_cast<ServoConfigError>(a)), "unknown configuration error");
     for (int b = 0; b < a; ++b) {
       EXPECT_NE(describe(static_cast<ServoConfigError>(a)),

@@ -22,7 +22,7 @@ enum class ServoState : std::uint8_t {
 /// What became of the message that was fed.
 enum class SampleVerdict : std::uint8_t {
   kUsed,
-  kRejected,    ///< taken for an outlier: it never steers
+  kRejected,    ///< taken for an outlier, or alone (no exchange holds it): it never steers
   kDuplicate,   ///< not newer than its predecessor
   kImplausible  ///< time went backward, absurd delay or interval
 };
@@ -104,7 +104,8 @@ concept ControlLaw = std::is_trivially_copyable_v<S> &&
 /// Optional: on_step(step), as above; on_new_epoch(), a clock was set back, and what was measured
 /// before is void (without it: reset()); snapshot_at(now), what it believes at a later moment, with
 /// the deviation grown until then; free_path_delay(sigma_ns), the delay that was given is to be
-/// estimated from now on.
+/// estimated from now on; path_delay_known(), for a servo that may hear an answer and not know the
+/// delay yet.
 template <class S>
 concept ClockServo = std::is_trivially_copyable_v<S> &&
     requires(S servo, const S& observed, const TimestampPair& pair, const ClockReading& now) {

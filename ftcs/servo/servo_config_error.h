@@ -22,6 +22,8 @@ enum class ServoConfigError : std::uint8_t {
   kLearntState,
   kWindow,
   kExternal,
+  kPathDelay,
+  kOutlierGate,
 };
 
 /// One sentence: what was expected.
@@ -53,6 +55,11 @@ enum class ServoConfigError : std::uint8_t {
       return "a learnt state needs a rate within 50 % of nominal, deviation and noise above zero";
     case ServoConfigError::kExternal:
       return "a servo of a shared library needs its functions and an instance";
+    case ServoConfigError::kPathDelay:
+      return "the path delay needs lowest <= highest and a filter over 1 to 32 delays";
+    case ServoConfigError::kOutlierGate:
+      return "the outlier gate needs a width above zero, a warm-up of at most 32 messages, one "
+             "rejection or more to exit and a resolution above zero";
     case ServoConfigError::kWindow:
       return "a window must hold 1 to 4096 exchanges";
   }

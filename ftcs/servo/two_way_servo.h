@@ -6,12 +6,12 @@
 #include "ftcs/measurement/outlier_gate.h"
 #include "ftcs/measurement/path_delay_estimator.h"
 #include "ftcs/servo/servo.h"
+#include "ftcs/servo/servo_config_error.h"
 #include "ftcs/time/relabel.h"
 
 namespace ftcs {
 
-/// What every classic servo needs in front of its control law. Nothing is checked; see PathDelay-
-/// and OutlierGateConfig for what is valid.
+/// What every classic servo needs in front of its control law. Valid: validate() finds nothing.
 struct TwoWayConfig {
   PathDelayConfig path_delay{};
   /// A path delay known otherwise (peer delay, wiring): backward messages are then not used. May be
@@ -22,6 +22,15 @@ struct TwoWayConfig {
   bool gate_enabled = true;
   OutlierGateConfig gate{};
 };
+
+/// The first thing that is wrong: kPathDelay (where none is fixed), kOutlierGate (where it is
+/// enabled).
+[[nodiscard]] constexpr std::optional<ServoConfigError> validate(
+    const TwoWayConfig& config) noexcept {
+  if (!config.fixed_path_delay && !config.path_delay.valid()) return ServoConfigError::kPathDelay;
+  if (config.gate_enabled && !config.gate.valid()) return ServoConfigError::kOutlierGate;
+  return std::nullopt;
+}
 
 /// A ClockServo made of a control law: path-delay estimator and outlier gate in front of it.
 ///
@@ -47,13 +56,14 @@ struct TwoWayConfig {
 template <ControlLaw Law>
 class TwoWayServo {
  public:
-  /// Valid: validate(law) finds nothing; not asked here.
+  /// Valid: validate(config) and validate(law) find nothing; not asked here.
   TwoWayServo(const TwoWayConfig& config, const typename Law::Config& law) noexcept
       : config_(config), delay_(config.path_delay), gate_(config.gate), law_(law) {}
 
   /// Messages come in order (in_order.h). Forward: the law's verdict and command; kRejected by the
   /// gate. Backward: never a command; kImplausible where the path delay it tells is impossible
-  /// (PathDelayConfig), kUsed for any other, even without a use.
+  /// (PathDelayConfig), kRejected where no forward message is near enough to it, else kUsed: it may
+  /// still be kept for the next forward message.
   ServoUpdate update(const TimestampPair& pair, const ClockReading& now) noexcept {
     return pair.direction == Direction::kForward ? on_forward(pair, now) : on_backward(pair);
   }
@@ -83,6 +93,9 @@ class TwoWayServo {
     if constexpr (requires { law_.on_step(step); }) law_.on_step(step);
   }
 
+  [[nodiscard]] bool path_delay_known() const noexcept {
+    return config_.fixed_path_delay.has_value() || delay_.known();
+  }
   /// The law's, with the path delay as known now and offset_known: the law has been fed.
   [[nodiscard]] ServoSnapshot snapshot() const noexcept {
     ServoSnapshot snapshot = law_.snapshot();
@@ -92,9 +105,6 @@ class TwoWayServo {
   }
 
  private:
-  [[nodiscard]] bool path_delay_known() const noexcept {
-    return config_.fixed_path_delay.has_value() || delay_.known();
-  }
   [[nodiscard]] Duration path_delay() const noexcept {
     return config_.fixed_path_delay.has_value() ? Duration{*config_.fixed_path_delay}
                                                 : delay_.path_delay();
@@ -141,10 +151,17 @@ class TwoWayServo {
 
   ServoUpdate on_backward(const TimestampPair& pair) noexcept {
     if (config_.fixed_path_delay.has_value()) return {};
-    const PathDelayUpdate update = delay_.on_backward(delay_stamp(pair), pair.reference);
-    const bool possible = update.verdict != PathDelayVerdict::kNegative &&
-                          update.verdict != PathDelayVerdict::kAbsurd;
-    return {possible ? SampleVerdict::kUsed : SampleVerdict::kImplausible, false, {}};
+    switch (delay_.on_backward(delay_stamp(pair), pair.reference).verdict) {
+      case PathDelayVerdict::kUsed:
+      case PathDelayVerdict::kDeferred:
+        return {};
+      case PathDelayVerdict::kNoPartner:
+        return {SampleVerdict::kRejected, false, {}};
+      case PathDelayVerdict::kNegative:
+      case PathDelayVerdict::kAbsurd:
+        break;
+    }
+    return {SampleVerdict::kImplausible, false, {}};
   }
 
   TwoWayConfig config_;

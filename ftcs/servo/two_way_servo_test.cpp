@@ -127,6 +127,18 @@ TEST(TwoWayServo, a_backward_message_never_commands_and_an_absurd_one_is_reporte
   EXPECT_NEAR(exchange.servo().snapshot().path_delay.ns(), 10'000.0, 1e-3);
 }
 
+TEST(TwoWayServo, an_answer_without_a_question_near_to_it_tells_no_path_delay) {
+  Exchange exchange{TwoWayServo<FtcsServo>{{}, ftcs_config()}, 0ns};
+  EXPECT_EQ(exchange.delay_request().verdict, SampleVerdict::kRejected) << "no Sync at all";
+  exchange.sync();
+  exchange.plant().advance_reference(Nanoseconds{17s});
+  EXPECT_EQ(exchange.delay_request().verdict, SampleVerdict::kRejected) << "17 s after it";
+  EXPECT_FALSE(exchange.servo().path_delay_known());
+  exchange.sync();
+  EXPECT_EQ(exchange.delay_request().verdict, SampleVerdict::kUsed);
+  EXPECT_TRUE(exchange.servo().path_delay_known());
+}
+
 TEST(TwoWayServo, a_rejected_message_never_steers) {
   Exchange exchange{TwoWayServo<FtcsServo>{{}, ftcs_config()}, 1ms};
   for (int n = 0; n < 12; ++n) exchange.cycle();

@@ -114,5 +114,28 @@ TEST(PidServo, without_a_derivative_part_is_the_incremental_pi) {
   EXPECT_NEAR(steady_rms(PidServo{config}, 20'000), 223.6, 5.0);
 }
 
+// Ten seconds of a jump are no offset that the oscillator made: the rate stays, and the next sample
+// is a first one.
+TEST(PidServo, does_not_act_on_a_sample_that_cannot_be_true) {
+  PidServo servo{{.sync_interval = Nanoseconds{1'000'000'000}}};
+  const auto at = [](double reference_s, double local_s) {
+    SyncSample sample;
+    sample.origin = ReferenceTime::from_ns(static_cast<std::int64_t>(reference_s * 1e9));
+    sample.local = LocalTime::from_ns(static_cast<std::int64_t>(local_s * 1e9));
+    sample.free_running = FreeRunningTime::from_ns(static_cast<std::int64_t>(local_s * 1e9));
+    return sample;
+  };
+  (void)servo.update(at(1.0, 1.0), {});
+  const ServoUpdate before = servo.update(at(2.0, 2.0 + 1e-6), {});
+  ASSERT_TRUE(before.has_command);
+  const ServoUpdate jumped = servo.update(at(13.0, 3.0), {});
+  EXPECT_EQ(jumped.verdict, SampleVerdict::kImplausible);
+  EXPECT_FALSE(jumped.has_command);
+  EXPECT_EQ(servo.snapshot().rate_ratio, before.command.tracking_rate);
+  const ServoUpdate next = servo.update(at(14.0, 14.0), {});
+  ASSERT_TRUE(next.has_command);
+  EXPECT_EQ(next.command.tracking_rate, before.command.tracking_rate) << "no kick";
+}
+
 }  // namespace
 }  // namespace ftcs

@@ -36,8 +36,8 @@ struct PidConfig {
 ///
 ///   a(n+1) = a(n) + [K_p (e(n) - e(n-1)) + K_i e(n) + K_d (e(n) - 2 e(n-1) + e(n-2))] / T
 ///
-/// Acts on its first sample if the interval is configured. An implausible ratio is not looked for:
-/// the loop follows whatever it is told.
+/// Acts on its first sample if the interval is configured. After an implausible one it begins anew,
+/// at the rate that it has: with errors of a clock that jumped, the proportional part would kick.
 class PidServo {
  public:
   using Config = PidConfig;
@@ -49,7 +49,8 @@ class PidServo {
     double interval_ns = static_cast<double>(config_.sync_interval.count());
     if (samples_ > 0) {
       const SampleProgress progress = progress_between(previous_, sample, RateLimits{});
-      if (progress.verdict == SampleVerdict::kDuplicate) return {progress.verdict, false, {}};
+      if (progress.verdict == SampleVerdict::kImplausible) reset();
+      if (progress.verdict != SampleVerdict::kUsed) return {progress.verdict, false, {}};
       if (interval_ns == 0.0) interval_ns = progress.reference.ns();
     }
     const double change = samples_ > 0 ? error - last_error_ : 0.0;
