@@ -14,6 +14,10 @@ struct CycleTimerConfig {
   Nanoseconds cycle_time{};  ///< nominal length of a cycle, on the steered clock; above 0
   Nanoseconds resolution{
       1};  ///< the timer can only fire at multiples of it on the unsteered clock; above 0
+
+  [[nodiscard]] constexpr bool valid() const noexcept {
+    return cycle_time > Nanoseconds{0} && resolution > Nanoseconds{0};
+  }
 };
 
 /// One trigger, on both clocks: |scheduled - virtual_instant| <= resolution / 2.
@@ -38,9 +42,10 @@ struct CycleTrigger {
 ///
 ///     for (;;) { sleep_until(timer.next(clock.history()).scheduled);  work();  timer.advance(); }
 ///
-/// BasicCycleServo is this with a servo around it. Neither length of the configuration is checked.
+/// BasicCycleServo is this with a servo around it.
 class CycleTimer {
  public:
+  /// Valid: config.valid(); it is not asked here.
   explicit CycleTimer(const CycleTimerConfig& config) noexcept
       : config_(config), next_(config.first) {}
 

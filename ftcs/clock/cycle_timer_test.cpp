@@ -50,6 +50,19 @@ TEST(CycleTimer, trigger_sits_on_the_grid_and_says_how_far_off_it_is) {
   EXPECT_NEAR(world.next().rounding().ns(), 2'620.0, 1e-5);
 }
 
+TEST(CycleTimerConfig, of_no_length_is_not_valid) {
+  EXPECT_TRUE(kRtx.valid());
+  EXPECT_FALSE(CycleTimerConfig{}.valid()) << "a cycle has no default";
+  for (const Nanoseconds length : {Nanoseconds{0}, Nanoseconds{-1}}) {
+    CycleTimerConfig config = kRtx;
+    config.cycle_time = length;
+    EXPECT_FALSE(config.valid());
+    config = kRtx;
+    config.resolution = length;
+    EXPECT_FALSE(config.valid());
+  }
+}
+
 TEST(CycleTimer, rounding_never_accumulates) {
   World world;
   const double cycle_ns = 20e6 * (1.0 + 17.3e-6);

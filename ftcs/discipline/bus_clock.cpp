@@ -32,6 +32,45 @@ FreeRunningTime crystal_of(const BusClockSample& sample) noexcept {
 
 }  // namespace
 
+std::string_view describe(BusConfigError error) noexcept {
+  switch (error) {
+    case BusConfigError::kCycle:
+      return "the cycle must be longer than zero";
+    case BusConfigError::kSync0Phase:
+      return "SYNC0 comes 0 to 1 cycles after the frame";
+    case BusConfigError::kSampleInterval:
+      return "a sample interval is a cycle or more";
+    case BusConfigError::kTimeConstant:
+      return "the time constant must be longer than zero";
+    case BusConfigError::kRateLimits:
+      return "the rate limits need 0 < slowest <= 1 <= fastest";
+    case BusConfigError::kPull:
+      return "the largest pull must be above zero";
+    case BusConfigError::kSlope:
+      return "the largest slope must be above zero";
+    case BusConfigError::kHoldover:
+      return "holdover begins after one missed sample interval or more";
+    case BusConfigError::kLock:
+      return "the lock's band needs 0 <= enter <= leave";
+  }
+  return "unknown configuration error";
+}
+
+std::optional<BusConfigError> validate(const BusClockConfig& config) noexcept {
+  // Written so that what is not a number fails too.
+  const auto usable = [](double limit) { return limit > 0.0 && std::isfinite(limit); };
+  if (config.cycle <= Nanoseconds{0}) return BusConfigError::kCycle;
+  if (!(config.sync0_phase >= 0.0 && config.sync0_phase <= 1.0)) return BusConfigError::kSync0Phase;
+  if (config.sample_interval < config.cycle) return BusConfigError::kSampleInterval;
+  if (config.time_constant <= Nanoseconds{0}) return BusConfigError::kTimeConstant;
+  if (!config.limits.valid()) return BusConfigError::kRateLimits;
+  if (!usable(config.largest_pull_ppb)) return BusConfigError::kPull;
+  if (!usable(config.largest_slope_ppb_per_s)) return BusConfigError::kSlope;
+  if (config.missed_intervals_to_holdover == 0) return BusConfigError::kHoldover;
+  if (!config.lock.band.valid()) return BusConfigError::kLock;
+  return std::nullopt;
+}
+
 const char* name(BusClockState state) noexcept {
   switch (state) {
     case BusClockState::kWaiting:

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "ftcs/discipline/lock_detector.h"
 #include "ftcs/servo/adaptive/adaptive_servo.h"
@@ -11,8 +13,7 @@
 
 namespace ftcs {
 
-/// Of a bus that follows plant time. Above zero must be: cycle, time_constant, pull and slope;
-/// sample_interval >= cycle; limits.valid(). Nothing is checked here (ftcs_bus_init() does).
+/// Of a bus that follows plant time. Valid: validate() finds nothing.
 struct BusClockConfig {
   /// False: the offset is told and nothing is moved.
   bool steer = true;
@@ -31,6 +32,24 @@ struct BusClockConfig {
   std::uint32_t missed_intervals_to_holdover = 8;
   LockConfig lock{{Nanoseconds{500}, Nanoseconds{2'000}}, 8};
 };
+
+/// Why a BusClockConfig cannot work.
+enum class BusConfigError : std::uint8_t {
+  kCycle,
+  kSync0Phase,
+  kSampleInterval,
+  kTimeConstant,
+  kRateLimits,
+  kPull,
+  kSlope,
+  kHoldover,
+  kLock,
+};
+/// One sentence: what was expected.
+[[nodiscard]] std::string_view describe(BusConfigError error) noexcept;
+/// The first thing that is wrong, in the order of the enumeration. A figure that is not a number
+/// is.
+[[nodiscard]] std::optional<BusConfigError> validate(const BusClockConfig& config) noexcept;
 
 /// One cycle: what the reference clock of the bus and plant time showed at one instant.
 struct BusClockSample {
@@ -91,6 +110,7 @@ struct BusClockDecision {
 /// starts (0x0920 of all SubDevices).
 class BusClock {
  public:
+  /// Valid: validate(config) finds nothing; it is not asked here.
   explicit BusClock(const BusClockConfig& config) noexcept;
 
   /// Once in each cycle, usable or not. The decision holds for the next frame. At the end of a

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -153,6 +154,28 @@ TEST_F(Bus, costs_a_cycle_less_than_a_microsecond_and_no_heap) {
   }
   RecordProperty("ns_a_cycle", static_cast<int>(best_ns));
   EXPECT_LT(best_ns, 1000.0);
+}
+
+TEST(BusClockConfig, says_what_is_wrong_with_it) {
+  using Error = BusConfigError;
+  EXPECT_EQ(validate(BusClockConfig{}), std::nullopt);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto wrong = [](const auto& change) {
+    BusClockConfig config;
+    change(config);
+    return validate(config);
+  };
+  EXPECT_EQ(wrong([](auto& c) { c.cycle = Nanoseconds{0}; }), Error::kCycle);
+  EXPECT_EQ(wrong([](auto& c) { c.sync0_phase = -0.1; }), Error::kSync0Phase);
+  EXPECT_EQ(wrong([=](auto& c) { c.sync0_phase = nan; }), Error::kSync0Phase);
+  EXPECT_EQ(wrong([](auto& c) { c.cycle = c.sample_interval + Nanoseconds{1}; }),
+            Error::kSampleInterval);
+  EXPECT_EQ(wrong([](auto& c) { c.time_constant = Nanoseconds{0}; }), Error::kTimeConstant);
+  EXPECT_EQ(wrong([](auto& c) { c.limits.slowest = Rate::from_ratio(0.0); }), Error::kRateLimits);
+  EXPECT_EQ(wrong([](auto& c) { c.largest_pull_ppb = 0.0; }), Error::kPull);
+  EXPECT_EQ(wrong([=](auto& c) { c.largest_slope_ppb_per_s = nan; }), Error::kSlope);
+  EXPECT_EQ(wrong([](auto& c) { c.missed_intervals_to_holdover = 0; }), Error::kHoldover);
+  EXPECT_EQ(wrong([](auto& c) { c.lock.band.enter = Nanoseconds{-1}; }), Error::kLock);
 }
 
 TEST_F(Bus, that_is_only_watched_is_never_moved) {

@@ -22,17 +22,6 @@ constexpr int64_t kHour = 3'600'000'000'000;
 bool is_time(int64_t ns) noexcept { return ns > 0 && ns <= kHour; }
 bool is_limit(double ppm) noexcept { return ppm > 0.0 && ppm < 1e5; }
 
-int32_t check(const ftcs_bus_config& config) noexcept {
-  if (!is_time(config.cycle_ns) || !is_time(config.sample_interval_ns) ||
-      !is_time(config.time_constant_ns) || config.sample_interval_ns < config.cycle_ns) {
-    return FTCS_BUS_BAD_TIME;
-  }
-  const bool phase = config.sync0_phase >= 0.0 && config.sync0_phase <= 1.0;
-  const bool limits =
-      is_limit(config.limit_ppm) && is_limit(config.pull_ppm) && is_limit(config.slope_ppm_per_s);
-  return phase && limits ? FTCS_BUS_OK : FTCS_BUS_BAD_LIMIT;
-}
-
 ftcs::BusClockConfig from_c(const ftcs_bus_config& config) noexcept {
   ftcs::BusClockConfig result;
   result.steer = config.steer != 0;
@@ -44,6 +33,17 @@ ftcs::BusClockConfig from_c(const ftcs_bus_config& config) noexcept {
   result.largest_pull_ppb = 1e3 * config.pull_ppm;
   result.largest_slope_ppb_per_s = 1e3 * config.slope_ppm_per_s;
   return result;
+}
+
+/// Narrower than what validate() takes: of figures that somebody wrote into a file.
+int32_t check(const ftcs_bus_config& config) noexcept {
+  if (!is_time(config.cycle_ns) || !is_time(config.sample_interval_ns) ||
+      !is_time(config.time_constant_ns) || config.sample_interval_ns < config.cycle_ns) {
+    return FTCS_BUS_BAD_TIME;
+  }
+  const bool limits =
+      is_limit(config.limit_ppm) && is_limit(config.pull_ppm) && is_limit(config.slope_ppm_per_s);
+  return limits && !validate(from_c(config)) ? FTCS_BUS_OK : FTCS_BUS_BAD_LIMIT;
 }
 
 }  // namespace

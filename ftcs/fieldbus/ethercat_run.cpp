@@ -208,6 +208,18 @@ std::optional<std::string> check_drive_sync(const RunOptions& options) {
   return std::nullopt;
 }
 
+std::optional<std::string> check_run(const RunOptions& options) {
+  if (auto wrong = check_drive_sync(options)) return wrong;
+  const node::CycleNodeConfig config = node_config(options, false);
+  if (const auto wrong = validate(config.supervision)) {
+    return fmt::format("--unlocked-limit: {}", describe(*wrong));
+  }
+  if (const auto wrong = validate(node::CycleNode::bus_config(config))) {
+    return fmt::format("--plant-time: {}", describe(*wrong));
+  }
+  return std::nullopt;
+}
+
 int exit_code_of(const diagnosis::CycleSeen& seen) noexcept {
   if (seen.failure != ethercat::FailureKind::kNone) return kRuntimeError;
   return diagnosis::cause_of(seen) == diagnosis::Cause::kLocked ? kSuccess : kNotLocked;

@@ -24,5 +24,7 @@ namespace ftcs::daemon {
 /// Shifts of SYNC0 and SYNC1 are within a cycle, which is known when all options are; one sentence
 /// if one is not.
 [[nodiscard]] std::optional<std::string> check_drive_sync(const RunOptions& options);
+/// The same, and whether supervision and bus clock can work with these options.
+[[nodiscard]] std::optional<std::string> check_run(const RunOptions& options);
 
 }  // namespace ftcs::daemon

@@ -49,5 +49,31 @@ TEST(EthercatRun, exit_code_zero_and_the_word_locked_go_together) {
   }
 }
 
+// 0.1 s is the least that --unlocked-limit takes, and 1 s the longest cycle: no cycle at all, after
+// which drives that never lost a lock would be stopped.
+TEST(EthercatRun, is_not_begun_where_supervision_cannot_work) {
+  RunOptions options;
+  EXPECT_EQ(check_run(options), std::nullopt);
+  options.servo.cycle = Nanoseconds{1'000'000'000};
+  EXPECT_EQ(check_run(options), std::nullopt) << "a sample of plant time takes a cycle or more";
+  options.unlocked_limit_s = 0.1;
+  const auto wrong = check_run(options);
+  ASSERT_TRUE(wrong);
+  EXPECT_TRUE(wrong->starts_with("--unlocked-limit: ")) << *wrong;
+  options.lock_policy = node::LockPolicy::kAdvisory;
+  EXPECT_EQ(check_run(options), std::nullopt);
+}
+
+TEST(DriveSupervisionConfig, says_what_is_wrong_with_it) {
+  using Error = node::SupervisionConfigError;
+  node::DriveSupervisionConfig config;
+  EXPECT_EQ(validate(config), std::nullopt);
+  config.recovery_interval = 0;
+  EXPECT_EQ(validate(config), Error::kRecoveryInterval);
+  config.unlocked_limit = 0;
+  EXPECT_EQ(validate(config), Error::kUnlockedLimit);
+  EXPECT_NE(describe(Error::kUnlockedLimit), describe(Error::kRecoveryInterval));
+}
+
 }  // namespace
 }  // namespace ftcs::daemon

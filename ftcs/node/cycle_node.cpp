@@ -38,6 +38,7 @@ BusClockConfig CycleNode::bus_config(const CycleNodeConfig& config) noexcept {
   BusClockConfig result = config.bus;
   result.steer = config.bus_mode != BusMode::kFollow && config.bus_write == BusWrite::kOffset;
   result.cycle = config.servo.cycle;
+  result.sample_interval = std::max(result.sample_interval, result.cycle);
   result.sync0_phase = config.sync0_phase;
   return result;
 }

@@ -32,8 +32,9 @@ enum class BusWrite : std::uint8_t {
   kReadTime,    ///< plant time as read before the frame is sent to 0x0910: late as the stack is
 };
 
-/// A segment, its cycle and who follows whom. Valid as each part says of its fields; not checked
-/// here. servo.cycle is the cycle of everything, servo.shift its place on the grid of system time.
+/// A segment, its cycle and who follows whom. Valid as each part says of its fields: validate() of
+/// supervision and of CycleNode::bus_config(); not asked here. servo.cycle is the cycle of
+/// everything, servo.shift its place on the grid of system time.
 struct CycleNodeConfig {
   /// Its process.objects, cycle and sync0_shift are set by the node. Where process.bridge has a
   /// value, plant time is that of a bridge terminal, whatever the stamps of the frames bring.
@@ -50,7 +51,8 @@ struct CycleNodeConfig {
   Nanoseconds difference_limit{1'000};
   BusMode bus_mode = BusMode::kFollow;
   BusWrite bus_write = BusWrite::kOffset;
-  BusClockConfig bus;  ///< its steer, cycle and sync0_phase are set by the node
+  /// Its steer, cycle and sync0_phase are set by the node, its sample_interval is at least a cycle.
+  BusClockConfig bus;
   DriveSupervisionConfig supervision;
   DriveAxesConfig axes;
 };
@@ -84,6 +86,8 @@ struct CycleNodeConfig {
 class CycleNode {
  public:
   explicit CycleNode(const CycleNodeConfig& config) noexcept;
+  /// What the bus clock of such a node is made with.
+  [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
   CycleNode(const CycleNode&) = delete;
   CycleNode& operator=(const CycleNode&) = delete;
 
@@ -139,7 +143,6 @@ class CycleNode {
   [[nodiscard]] static Objects objects_for(const CycleNodeConfig& config) noexcept;
   [[nodiscard]] static ethercat::MainDeviceConfig main_config(const CycleNodeConfig& config,
                                                               const Objects& objects) noexcept;
-  [[nodiscard]] static BusClockConfig bus_config(const CycleNodeConfig& config) noexcept;
   void write_time(FreeRunningTime now, ReferenceTime plant) noexcept;
   [[nodiscard]] std::optional<ReferenceTime> plant_at_reference(
       bool answered, const ethercat::FrameStamps& stamps) noexcept;

@@ -7,6 +7,24 @@ using ethercat::AlState;
 using ethercat::FailureKind;
 using Kind = CycleNote::Kind;
 
+std::string_view describe(SupervisionConfigError error) noexcept {
+  switch (error) {
+    case SupervisionConfigError::kUnlockedLimit:
+      return "drives are stopped after one cycle without the lock or more";
+    case SupervisionConfigError::kRecoveryInterval:
+      return "between two recoveries of a drive lies one cycle or more";
+  }
+  return "unknown configuration error";
+}
+
+std::optional<SupervisionConfigError> validate(const DriveSupervisionConfig& config) noexcept {
+  if (config.lock_policy == LockPolicy::kRecovering && config.unlocked_limit == 0) {
+    return SupervisionConfigError::kUnlockedLimit;
+  }
+  if (config.recovery_interval == 0) return SupervisionConfigError::kRecoveryInterval;
+  return std::nullopt;
+}
+
 void DriveSupervision::cycle(ethercat::MainDevice& main, CycleState state, bool ready,
                              CycleNotes& notes) noexcept {
   ++cycles_;

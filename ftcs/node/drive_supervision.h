@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "ftcs/discipline/cycle_servo_types.h"
 #include "ftcs/discipline/lock_watch.h"
@@ -19,7 +21,7 @@ enum class LockPolicy : std::uint8_t {
   kFatal,       ///< the drives are stopped at once
 };
 
-/// Limits in cycles. unlocked_limit and recovery_interval must be above zero, unchecked.
+/// Limits in cycles. Valid: validate() finds nothing.
 struct DriveSupervisionConfig {
   LockPolicy lock_policy = LockPolicy::kRecovering;
   std::uint64_t unlocked_limit = 10'000;
@@ -35,6 +37,17 @@ struct DriveSupervisionConfig {
   std::uint64_t op_limit = 30'000;
 };
 
+/// Why a DriveSupervisionConfig cannot work.
+enum class SupervisionConfigError : std::uint8_t {
+  kUnlockedLimit,     ///< zero: drives would be stopped that never lost a lock
+  kRecoveryInterval,  ///< zero: no cycle is a multiple of it
+};
+/// One sentence: what was expected.
+[[nodiscard]] std::string_view describe(SupervisionConfigError error) noexcept;
+/// The first thing that is wrong. unlocked_limit is asked of kRecovering alone.
+[[nodiscard]] std::optional<SupervisionConfigError> validate(
+    const DriveSupervisionConfig& config) noexcept;
+
 /// When drives are asked for OP, helped back into it and stopped: SAFEOP to OP waits for the lock
 /// of the cycle; who left OP is acknowledged and asked again; a lock that does not come back stops
 /// all (LockPolicy). Frames and working counters are the MainDevice's own affair.
@@ -46,6 +59,7 @@ struct DriveSupervisionConfig {
 /// Without a law (`followed` false) the lock stops nothing; op_limit does.
 class DriveSupervision {
  public:
+  /// Valid: validate(config) finds nothing; it is not asked here.
   /// `followed`: the cycle has a law, so that its lock means something.
   DriveSupervision(const DriveSupervisionConfig& config, bool followed) noexcept
       : config_(config), followed_(followed) {}

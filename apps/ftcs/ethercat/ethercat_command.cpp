@@ -164,7 +164,7 @@ std::optional<std::string> complete(EthercatArguments& arguments) {
   }
   if (auto wrong = read_bridge(options)) return wrong;
   if (auto wrong = open_keys(options.ptp)) return "--ptp-config: " + *wrong;
-  if (auto wrong = daemon::check_drive_sync(options)) return wrong;
+  if (auto wrong = daemon::check_run(options)) return wrong;
   if (arguments.gains.empty()) return std::nullopt;
   if (arguments.gains.size() != 2 || !(arguments.gains[0] >= 0.0 && arguments.gains[1] >= 0.0)) {
     return "--gains: two numbers, as in 1,1";
