@@ -7,34 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "addend_plant.h"
+#include "addend_node.h"
 
 namespace ftcs::addend_test {
 namespace {
-
-constexpr std::int64_t kInterval = 125'000'000;
-constexpr std::int64_t kLatency = 1'000'000;
-
-struct Node {
-  explicit Node(const ftcs_addend_config& wanted) : config(wanted) {
-    EXPECT_EQ(ftcs_addend_init(&servo, &config, Plant::kNominal), FTCS_ADDEND_OK);
-  }
-  ftcs_addend_command step(Plant& plant) {
-    const ftcs_addend_sample sample = plant.sample(kLatency);
-    const ftcs_addend_command command = ftcs_addend_update(&servo, &sample);
-    plant.obey(command, sample.now_ns);
-    plant.next();
-    return command;
-  }
-  void run(Plant& plant, int samples) {
-    for (int n = 0; n < samples; ++n) step(plant);
-  }
-  ftcs_addend_config config;
-  ftcs_addend_servo servo{};
-};
-
-ftcs_addend_config plain() { return ftcs_addend_default_config(Plant::kNominal); }
-ftcs_addend_config quiet() { return ftcs_addend_quiet_config(Plant::kNominal); }
 
 TEST(AddendServo, removes_a_millisecond_and_fifty_ppm_in_one_interval_and_says_that_it_is_locked) {
   Plant plant(kInterval, 50'000.0, 1'000'000, 0.0);

@@ -181,6 +181,13 @@ const char* text(std::uint16_t index, bool drive) noexcept {
   return drive ? "FTCS modelled servo drive" : "FTCS modelled bridge terminal";
 }
 
+/// At most eight octets, the lowest first.
+std::uint64_t value_of(ConstBytes octets) noexcept {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < octets.size(); ++i) value |= std::uint64_t{octets[i]} << (8 * i);
+  return value;
+}
+
 ObjectAddress address_in(std::uint32_t mapped) noexcept {
   return {static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)};
 }
@@ -249,8 +256,7 @@ SdoAbort ObjectDictionary::download(ObjectAddress object, ConstBytes data, bool 
   if (entry.access == kRead) return SdoAbort::kReadOnly;
   if (entry.access == kConfigure && !preop) return SdoAbort::kWrongState;
   if (data.size() != entry.size) return SdoAbort::kLengthMismatch;
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < data.size(); ++i) value |= std::uint64_t{data[i]} << (8 * i);
+  const std::uint64_t value = value_of(data);
   const bool map = object.index == obj::kReceiveMap || object.index == obj::kTransmitMap;
   if (map && object.subindex == 0) {
     const SdoAbort abort = check_mapping(object.index, static_cast<std::uint32_t>(value));
@@ -312,9 +318,7 @@ void ObjectDictionary::write_mapped(ConstBytes outputs) noexcept {
     const std::uint32_t mapped = mapping(obj::kReceiveAssign, n);
     const std::size_t size = bytes_in(mapped);
     if (at + size > outputs.size()) return;
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < size; ++i) value |= std::uint32_t{outputs[at + i]} << (8 * i);
-    if (size > 0) set(address_in(mapped), value);
+    if (size > 0 && !is_gap(mapped)) set(address_in(mapped), value_of(outputs.subspan(at, size)));
     at += size;
   }
 }
