@@ -2,6 +2,7 @@
 #include "apps/ftcs/manual.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -83,15 +84,29 @@ std::string synopsis(const CLI::App& app, const std::string& path) {
   return line + (visible(app).empty() ? "\n" : " \\fICOMMAND\\fR ...\n");
 }
 
+/// `visit` sees each command with its path: "", "ptp", "ethercat run".
+template <class Visit>
+void walk(const CLI::App& app, const std::string& path, const Visit& visit) {
+  std::vector<std::pair<const CLI::App*, std::string>> waiting{{&app, path}};
+  while (!waiting.empty()) {
+    const auto [command, name] = waiting.back();
+    waiting.pop_back();
+    visit(*command, name);
+    const auto below = visible(*command);
+    for (auto next = below.rbegin(); next != below.rend(); ++next) {
+      waiting.emplace_back(*next, name + (name.empty() ? "" : " ") + (*next)->get_name());
+    }
+  }
+}
+
 /// Commands below this one, each with its own options.
 std::string nested(const CLI::App& app, const std::string& path) {
   std::string text;
-  for (const CLI::App* command : visible(app)) {
-    const std::string name = path + " " + command->get_name();
-    text += fmt::format(".SH \"{}\"\n{}.PP\n{}\n{}", roff(name), synopsis(*command, name),
-                        roff(command->get_description()), options_section(*command));
-    text += nested(*command, name);
-  }
+  walk(app, path, [&](const CLI::App& command, const std::string& name) {
+    if (&command == &app) return;
+    text += fmt::format(".SH \"{}\"\n{}.PP\n{}\n{}", roff(name), synopsis(command, name),
+                        roff(command.get_description()), options_section(command));
+  });
   return text;
 }
 
@@ -118,15 +133,6 @@ std::string choices(const CLI::Option& option) {
   std::string list = type.substr(from + 2, to - from - 2);
   std::replace(list.begin(), list.end(), ',', ' ');
   return list;
-}
-
-/// `visit` sees each command with its path: "", "ptp", "ethercat run".
-template <class Visit>
-void walk(const CLI::App& app, const std::string& path, const Visit& visit) {
-  visit(app, path);
-  for (const CLI::App* command : visible(app)) {
-    walk(*command, path.empty() ? command->get_name() : path + " " + command->get_name(), visit);
-  }
 }
 
 std::string words(const CLI::App& app) {

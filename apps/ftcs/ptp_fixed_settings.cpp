@@ -71,6 +71,7 @@ const Fixed* find(std::string_view name) {
 
 std::vector<std::string> fixed_setting_names() {
   std::vector<std::string> names;
+  names.reserve(kFixed.size());
   for (const Fixed& fixed : kFixed) names.emplace_back(fixed.name);
   return names;
 }

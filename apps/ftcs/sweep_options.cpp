@@ -64,7 +64,7 @@ void refuse_unknown(const std::vector<std::string>& names, const std::vector<Sce
 /// Returns the servos that somebody else wrote.
 ServoLibraries apply(const SweepOptions& options, std::vector<Scenario>& scenarios) {
   std::vector<std::string> names = options.servos;
-  const auto libraries = load_servos(names);
+  auto libraries = load_servos(names);
   refuse_unknown(names, scenarios);
   for (Scenario& scenario : scenarios) {
     if (options.medians_only && scenario.fresh_seeds != 0) scenario.seeds = scenario.fresh_seeds;

@@ -61,9 +61,9 @@ std::vector<MtiePoint> mtie(PhaseRecord record, std::span<const std::size_t> ave
     const Peak peak = largest_range(record.seconds, n + 1);
     if (peak.windows == 0) continue;
     // Gaps count as record that is not there: windows + n points hold so many side by side.
-    const auto independent = static_cast<double>((peak.windows + n) / (n + 1));
+    const std::size_t independent = (peak.windows + n) / (n + 1);
     points.push_back({n, static_cast<double>(n) * record.interval_s, peak.range, peak.windows,
-                      std::pow(1.0 - confidence, 1.0 / independent)});
+                      std::pow(1.0 - confidence, 1.0 / static_cast<double>(independent))});
   }
   return points;
 }

@@ -148,7 +148,7 @@ double normalize(Deviation deviation, double square, double tau_s) {
 double bias(Deviation deviation, PowerLawNoise noise, std::size_t m) {
   constexpr double kModified[] = {0.69, 0.70, 0.73, 0.83, 0.94};  // alpha -2 to 2
   constexpr double kHadamard[] = {0.771, 0.851, 0.995, 1.0, 1.0};
-  const auto row = static_cast<std::size_t>(static_cast<int>(noise) + 2);
+  const int row = static_cast<int>(noise) + 2;
   if (!is_of_stretches(deviation, m)) return 1.0;
   return deviation == Deviation::kHadamardTotal ? kHadamard[row] : kModified[row];
 }
