@@ -1,5 +1,5 @@
 # The standard library's headers (and GoogleTest's, fmt's) are parsed once per build instead of once per file
-# (decision 0017). Each file still names what it includes: the presets clang and tidy build without.
+# (decision 0016). Each file still names what it includes: the presets clang and tidy build without.
 option(FTCS_PRECOMPILED_HEADERS "Parse the headers of other projects once for all files" ON)
 
 # A compiler takes a precompiled header only for the flags that it was made with: one for each set of flags.

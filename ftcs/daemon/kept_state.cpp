@@ -9,14 +9,11 @@
 #include <system_error>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "ftcs/platform/durable_file.h"
+#include "ftcs/report/json.h"
 
 namespace ftcs::daemon {
 namespace {
-
-using Json = nlohmann::json;
 
 /// Another format gets another number; a file with a higher one is of a later program.
 constexpr int kVersion = 1;
@@ -65,7 +62,7 @@ std::string to_text(const KeptState& state) {
                      {"rate_ppb", state.learnt.rate_deviation * 1e9},
                      {"rate_sigma_ppb", state.learnt.rate_sigma * 1e9},
                      {"timestamp_noise_ns", state.learnt.timestamp_noise_ns}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dump(json);
 }
 
 Result<LearntState, std::string> read_kept_state(std::string_view text, std::string_view clock,

@@ -8,6 +8,7 @@
 #include "ftcs/fieldbus/run_report.h"
 #include "ftcs/platform/stop_flag.h"
 #include "ftcs/report/cycle_report.h"
+#include "ftcs/report/json.h"
 
 namespace ftcs::daemon {
 

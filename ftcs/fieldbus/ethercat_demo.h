@@ -7,7 +7,7 @@
 #include "ftcs/experiment/two_machines.h"
 #include "ftcs/fieldbus/local_segment.h"
 #include "ftcs/fieldbus/main_runner.h"
-#include "ftcs/report/json.h"
+#include "ftcs/report/json_fwd.h"
 
 namespace ftcs::daemon {
 

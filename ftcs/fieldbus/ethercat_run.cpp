@@ -105,7 +105,7 @@ void say_setup(MainRunner& runner, const platform::RealtimeSetup& setup) {
 std::optional<WriteError> write_reports(const MainRunner& runner) {
   const RunOptions& options = runner.options();
   if (!options.json.empty()) {
-    if (auto error = write_file(options.json, dump(run_json(runner)))) return error;
+    if (auto error = write_file(options.json, run_json_text(runner))) return error;
   }
   if (options.html.empty()) return std::nullopt;
   const MainRunner* const runs[] = {&runner};

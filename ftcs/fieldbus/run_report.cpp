@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "ftcs/fieldbus/run_histograms.h"
+#include "ftcs/report/json.h"
 
 namespace ftcs::daemon {
 
@@ -367,5 +368,7 @@ Json run_json(const MainRunner& runner) {
   if (runner.main().failure()) json["failure"] = describe(runner.main().failure());
   return json;
 }
+
+std::string run_json_text(const MainRunner& runner) { return dump(run_json(runner)); }
 
 }  // namespace ftcs::daemon

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "ftcs/fieldbus/main_runner.h"
-#include "ftcs/report/json.h"
+#include "ftcs/report/json_fwd.h"
 
 namespace ftcs::daemon {
 
@@ -18,5 +18,7 @@ void print_run(const MainRunner& runner);
 /// |0x092C| as it was last; null: nobody asked that drive.
 [[nodiscard]] Json difference_json(const node::DriveClocks::Seen& clock);
 [[nodiscard]] Json run_json(const MainRunner& runner);
+/// The same as the text of a file.
+[[nodiscard]] std::string run_json_text(const MainRunner& runner);
 
 }  // namespace ftcs::daemon

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "ftcs/experiment/cycle_experiment.h"
-#include "ftcs/report/json.h"
+#include "ftcs/report/json_fwd.h"
 #include "ftcs/report/plot.h"
 #include "ftcs/report/table.h"
 

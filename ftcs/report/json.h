@@ -9,11 +9,9 @@
 #include "ftcs/analysis/mtie.h"
 #include "ftcs/analysis/stability.h"
 #include "ftcs/analysis/statistics.h"
+#include "ftcs/report/json_fwd.h"
 
 namespace ftcs {
-
-/// Fields in the order in which they were written. A number that is not finite is written as null.
-using Json = nlohmann::ordered_json;
 
 /// A number, or null where there is no figure.
 [[nodiscard]] Json number(double value);
