@@ -50,18 +50,12 @@ int run(std::vector<std::string> words) {
   app.set_version_flag("-v,--version", "ftcs " FTCS_VERSION);
   app.require_subcommand(1);
   int exit_code = kSuccess;
-  add_analyse_command(app, exit_code);
-  add_demo_command(app, exit_code);
-  add_compare_command(app, exit_code);
-  add_doctor_command(app, exit_code);
-  add_ethercat_command(app, exit_code);
-  add_ethercat_segment_command(app, exit_code);
-  add_manual_command(app, exit_code);
-  add_paper_command(app, exit_code);
-  add_phc_command(app, exit_code);
-  add_ptp_command(app, exit_code);
-  add_simulate_command(app, exit_code);
-  add_status_command(app, exit_code);
+  for (const auto add :
+       {add_analyse_command, add_demo_command, add_compare_command, add_doctor_command,
+        add_ethercat_command, add_ethercat_segment_command, add_manual_command, add_paper_command,
+        add_phc_command, add_ptp_command, add_simulate_command, add_status_command}) {
+    add(app, exit_code);
+  }
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
   const bool has_command = std::find(commands.begin(), commands.end(), name) != commands.end();

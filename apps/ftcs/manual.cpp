@@ -87,14 +87,12 @@ std::string synopsis(const CLI::App& app, const std::string& path) {
 /// `visit` sees each command with its path: "", "ptp", "ethercat run".
 template <class Visit>
 void walk(const CLI::App& app, const std::string& path, const Visit& visit) {
-  std::vector<std::pair<const CLI::App*, std::string>> waiting{{&app, path}};
-  while (!waiting.empty()) {
-    const auto [command, name] = waiting.back();
-    waiting.pop_back();
+  std::vector<std::pair<const CLI::App*, std::string>> all{{&app, path}};
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    const auto [command, name] = all[n];
     visit(*command, name);
-    const auto below = visible(*command);
-    for (auto next = below.rbegin(); next != below.rend(); ++next) {
-      waiting.emplace_back(*next, name + (name.empty() ? "" : " ") + (*next)->get_name());
+    for (const CLI::App* below : visible(*command)) {
+      all.emplace_back(below, name + (name.empty() ? "" : " ") + below->get_name());
     }
   }
 }

@@ -70,9 +70,8 @@ const Fixed* find(std::string_view name) {
 }  // namespace
 
 std::vector<std::string> fixed_setting_names() {
-  std::vector<std::string> names;
-  names.reserve(kFixed.size());
-  for (const Fixed& fixed : kFixed) names.emplace_back(fixed.name);
+  std::vector<std::string> names(kFixed.size());
+  std::ranges::transform(kFixed, names.begin(), &Fixed::name);
   return names;
 }
 
