@@ -11,6 +11,7 @@
 #include "ftcs/fieldbus/local_segment.h"
 #include "ftcs/fieldbus/run_histograms.h"
 #include "ftcs/fieldbus/run_report.h"
+#include "ftcs/report/json.h"
 #include "test/support/forbid_allocation.h"
 
 namespace ftcs::daemon {

@@ -129,6 +129,7 @@ void write_messages(Exposition& out, const WatchedMessages& messages) {
 
 void write_tdev(Exposition& out, const std::vector<StabilityPoint>& tdev) {
   std::vector<Exposition::Sample> samples;
+  samples.reserve(tdev.size());
   for (const StabilityPoint& point : tdev) {
     // A grid that does not move with the measured interval.
     samples.push_back({label("tau", fmt::format("{:.2g}", point.tau_s)), point.deviation});

@@ -178,10 +178,11 @@ FrameOutcome MainDevice::confirm_stop(const FrameView& frame, FreeRunningTime no
 
 FrameOutcome MainDevice::advance(Progress progress) noexcept {
   if (progress == Progress::kContinue) return FrameOutcome::kProgress;
-  if (progress == Progress::kFailed) {
+  const auto stop = [this] {
     stage_ = Stage::kStopped;
     return FrameOutcome::kStopped;
-  }
+  };
+  if (progress == Progress::kFailed) return stop();
   if (stage_ == Stage::kScan && clocks_wanted()) {
     clock_setup_.start(config_.clocks);
     stage_ = Stage::kClocks;
@@ -196,15 +197,14 @@ FrameOutcome MainDevice::advance(Progress progress) noexcept {
     stage_ = Stage::kCyclic;
     return FrameOutcome::kProgress;
   }
-  if (config_.scan_only) {
-    stage_ = Stage::kStopped;
-    return FrameOutcome::kStopped;
-  }
+  if (config_.scan_only) return stop();
   if (config_.needs_reference && !network_.has_reference()) {
-    return advance(fail(failure_, {.kind = FailureKind::kNoDistributedClock}));
+    (void)fail(failure_, {.kind = FailureKind::kNoDistributedClock});
+    return stop();
   }
   if (config_.process.bridge && !bridge::choose(network_, *config_.process.bridge)) {
-    return advance(fail(failure_, {.kind = FailureKind::kNoBridge}));
+    (void)fail(failure_, {.kind = FailureKind::kNoBridge});
+    return stop();
   }
   configurator_.start(config_.process);
   stage_ = Stage::kConfigure;

@@ -218,7 +218,7 @@ Progress Scanner::read_sii(const FrameView& frame, Network& network, FreeRunning
 }
 
 Progress Scanner::next_sii_word(Network& network, Failure& failure) noexcept {
-  constexpr std::size_t kIdentityEnd = 0x10 * 2;
+  constexpr std::size_t kIdentityEnd = std::size_t{0x10} * 2;
   constexpr std::size_t kCategories = sii::kCategoriesWord * 2;
   SubDeviceInfo& device = network.devices[device_];
   bool done = image_used_ == kIdentityEnd && take_from_twin(network);
