@@ -270,6 +270,10 @@ std::string text_of(const Json& status) {
 }
 
 int exit_code_of(const Json& status) {
+  if (word(status, "role") == "ethercat" && status.contains("diagnosis")) {
+    const bool locked = word(status.at("diagnosis"), "cause") == name(diagnosis::Cause::kLocked);
+    return locked ? kSuccess : kNotLocked;
+  }
   if (status.contains("locked")) return is_true(status, "locked") ? kSuccess : kNotLocked;
   return word(status, "port_state") == to_string(ptp::PortState::kTimeTransmitter) ? kSuccess
                                                                                    : kNotLocked;

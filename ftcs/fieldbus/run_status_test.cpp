@@ -31,6 +31,10 @@ class RunStatusTest : public ::testing::Test {
     snapshot_.bus.dc_to_plant = Duration::from_ns(-25.0);
     snapshot_.bus.sigma_ns = 31.0;
     snapshot_.bus.rate_ppb = -29'952.0;
+    snapshot_.seen.state = CycleState::kLocked;
+    snapshot_.seen.cycles = 1000;
+    snapshot_.seen.margin_ns = 5e5;
+    snapshot_.seen.cycle_ns = 1e6;
   }
   ~RunStatusTest() override { std::filesystem::remove_all(folder_); }
   [[nodiscard]] std::string ask() const {
@@ -75,8 +79,16 @@ TEST_F(RunStatusTest, a_clock_that_nobody_has_looked_at_is_not_said_to_be_right)
 }
 
 TEST_F(RunStatusTest, is_not_locked_before_the_cycle_is) {
-  snapshot_.state = CycleState::kAcquiring;
+  snapshot_.state = snapshot_.seen.state = CycleState::kAcquiring;
   snapshot_.bus = {};
+  const auto read = read_status(run_status(options_, snapshot_));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->exit_code, kNotLocked);
+}
+
+// The sentence says "in phase, but": the code must not say "locked".
+TEST_F(RunStatusTest, is_not_locked_while_something_speaks_against_the_cycle) {
+  snapshot_.seen.late = snapshot_.seen.cycles;
   const auto read = read_status(run_status(options_, snapshot_));
   ASSERT_TRUE(read);
   EXPECT_EQ(read->exit_code, kNotLocked);
