@@ -96,7 +96,7 @@ PaperRow read_row(TomlTable table, const sim::OneWaySpec& world) {
 }
 
 const std::vector<std::pair<std::string, CheckFigure>>& figure_names() {
-  static const std::vector<std::pair<std::string, CheckFigure>> kNames = {
+  static const std::vector<std::pair<std::string, CheckFigure>> names = {
       {"rms", CheckFigure::kRms},
       {"median", CheckFigure::kMedian},
       {"true_rms", CheckFigure::kTrueRms},
@@ -109,7 +109,7 @@ const std::vector<std::pair<std::string, CheckFigure>>& figure_names() {
       {"spread", CheckFigure::kSpread},
       {"probability", CheckFigure::kProbability},
       {"settling_time", CheckFigure::kSettlingTime}};
-  return kNames;
+  return names;
 }
 
 CheckFigure read_figure(TomlTable& table) {

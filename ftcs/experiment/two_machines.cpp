@@ -174,8 +174,9 @@ double kalman_variance(double r, double q, double dt) {
 }
 
 template <class Field>
-void take(TwoMachinesRow& row, std::vector<TwoMachinesRun> runs, Field field) {
+void take(TwoMachinesRow& row, const std::vector<TwoMachinesRun>& runs, Field field) {
   std::vector<double> values;
+  values.reserve(runs.size());
   for (const TwoMachinesRun& run : runs) values.push_back(run.*field);
   std::sort(values.begin(), values.end());
   row.median.*field = values[values.size() / 2];

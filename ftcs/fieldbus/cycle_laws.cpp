@@ -6,8 +6,8 @@
 namespace ftcs::daemon {
 
 std::span<const std::string> cycle_law_names() {
-  static const std::array<std::string, 5> kNames{"ftcs", "pics", "adaptive", "soem-pi", "none"};
-  return kNames;
+  static const std::array<std::string, 5> names{"ftcs", "pics", "adaptive", "soem-pi", "none"};
+  return names;
 }
 
 void set_cycle_law(RunOptions& options, std::string_view name) {

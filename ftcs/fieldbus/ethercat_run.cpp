@@ -153,6 +153,20 @@ bool try_print_run(const MainRunner& runner) {
   return false;
 }
 
+/// Figures, records and what the run came to.
+int end_run(MainRunner& runner) {
+  const bool printed = runner.options().quiet || try_print_run(runner);
+  // The figures are written even if a record is cut short, and whatever ended the run.
+  const auto reports = write_reports(runner);
+  const auto csv = runner.finish_csv();
+  if (csv) end_with(csv->message + " (the run went on without it)", kRuntimeError);
+  if (reports) end_with(reports->message, kRuntimeError);
+  if (runner.main().failure()) return end_with(runner.main().failure(), runner.options());
+  if (csv || reports || !printed) return kRuntimeError;
+  const int code = exit_code_of(runner.seen());
+  return code == kSuccess ? code : end_with(std::string(runner.sentence()), code);
+}
+
 int run_main(MainRunner& runner, const std::function<bool()>& stop) {
   const RunOptions& options = runner.options();
   if (const auto error = runner.open_csv()) return end_with(error->message, kRuntimeError);
@@ -174,16 +188,7 @@ int run_main(MainRunner& runner, const std::function<bool()>& stop) {
     return end_with(*wrong, kRuntimeError);
   }
   runner.run(stop);
-  const bool printed = options.quiet || try_print_run(runner);
-  // The figures are written even if a record is cut short, and whatever ended the run.
-  const auto reports = write_reports(runner);
-  const auto csv = runner.finish_csv();
-  if (csv) end_with(csv->message + " (the run went on without it)", kRuntimeError);
-  if (reports) end_with(reports->message, kRuntimeError);
-  if (runner.main().failure()) return end_with(runner.main().failure(), options);
-  if (csv || reports || !printed) return kRuntimeError;
-  const int code = exit_code_of(runner.seen());
-  return code == kSuccess ? code : end_with(std::string(runner.sentence()), code);
+  return end_run(runner);
 }
 
 }  // namespace

@@ -116,7 +116,7 @@ Result<PlantClock, std::string> open_plant_clock(const std::string& name, PtpOpt
     return std::string("on which interface? As in ptp:eth1, or by --ptp-config");
   }
   auto source = PtpPlantSource::start(kernel, ptp);
-  if (!source) return std::move(source.error());
+  if (!source) return source.error();
   return PlantClock(kernel, name, std::move(*source));
 }
 

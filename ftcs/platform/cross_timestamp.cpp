@@ -129,8 +129,8 @@ CrossTimestamper::Attempt CrossTimestamper::basic(unsigned readings) noexcept {
   if (result < 0) return {result, {}};
   Quickest quickest;
   for (unsigned i = 0; i < std::min(request.n_samples, readings); ++i) {
-    quickest.offer(nanoseconds(request.ts[2 * i]), nanoseconds(request.ts[2 * i + 1]),
-                   nanoseconds(request.ts[2 * i + 2]));
+    const ptp_clock_time* const read = &request.ts[std::size_t{2} * i];
+    quickest.offer(nanoseconds(read[0]), nanoseconds(read[1]), nanoseconds(read[2]));
   }
   if (!quickest.found()) return {kShortRead, {}};
   return {0, quickest.reading()};

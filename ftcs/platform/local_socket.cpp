@@ -121,7 +121,7 @@ namespace {
 std::string folder_for_client(const std::string& server) {
   const std::size_t slash = server.rfind('/');
   if (slash != std::string::npos && slash > 0) {
-    const std::string beside = server.substr(0, slash);
+    std::string beside = server.substr(0, slash);
     if (::access(beside.c_str(), W_OK) == 0) return beside;
   }
   const char* const given = std::getenv("TMPDIR");  // one thread

@@ -120,7 +120,7 @@ Result<NtpShm, OsError> NtpShm::open(int unit) {
   const int id = ::shmget(kKey + unit, sizeof(Segment), IPC_CREAT | mode);
   if (id < 0) return os_error(errno, what);
   void* const memory = ::shmat(id, nullptr, 0);
-  if (memory == reinterpret_cast<void*>(-1)) return os_error(errno, what);
+  if (reinterpret_cast<std::intptr_t>(memory) == -1) return os_error(errno, what);
   auto* const segment = static_cast<Segment*>(memory);
   segment->valid.store(0);
   segment->mode = 1;

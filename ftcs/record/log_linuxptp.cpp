@@ -136,6 +136,7 @@ class LinuxptpLog final : public LogFormat {
   /// off the clock was is known in magnitude alone.
   void rebuild(const std::vector<SummaryLogLine>& summaries, RecordedLog& log) {
     std::vector<std::optional<double>> times;
+    times.reserve(summaries.size());
     for (const SummaryLogLine& line : summaries) times.push_back(line.time_s);
     const std::vector<double> steps_s = intervals(times, log);
     log.steered = !ran_freely(summaries, steps_s);

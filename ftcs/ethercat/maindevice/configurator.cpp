@@ -221,17 +221,15 @@ Progress Configurator::take_reference_time(ConstBytes system_time, Network& netw
   return Progress::kDone;
 }
 
-/// Two pairs of stamps, so that the terminal is known to run: the second one counts. Between them
-/// its other side must have stayed: the pair that it shows when it comes back may be one of before.
+/// Two pairs of stamps, so that the terminal is known to run: the second one counts. Of before a
+/// gap of its other side none does.
 Progress Configurator::take_bridge_time(const Datagram& inputs, FreeRunningTime now,
                                         Failure& failure) noexcept {
   if (inputs.working_counter() == 1) {
     const auto stamps = bridge::Inputs::decode(inputs.data());
-    if (stamps.alone) {
-      first_toggle_.reset();
-    } else if (!first_toggle_) {
-      first_toggle_ = stamps.updated;
-    } else if (*first_toggle_ != stamps.updated) {
+    if (stamps.alone) first_toggle_.reset();
+    if (!stamps.alone && !first_toggle_) first_toggle_ = stamps.updated;
+    if (!stamps.alone && *first_toggle_ != stamps.updated) {
       has_shift_ = true;
       shift_ = stamps.external - stamps.internal;
       return Progress::kDone;
