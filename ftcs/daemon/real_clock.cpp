@@ -69,7 +69,8 @@ void RealClock::set_fixed_scale(int reference_ahead_of_utc_s, int clock_ahead_of
 }
 
 bool RealClock::admits(ReferenceTime reference, FreeRunningTime event) noexcept {
-  return utc_.admits(reference, event, kernel_.clock_ns(CLOCK_REALTIME));
+  // What the oscillator did not sleep through it has counted.
+  return utc_.admits(reference, event - clock_.ran_asleep(), kernel_.clock_ns(CLOCK_REALTIME));
 }
 
 bool RealClock::admits_change(Duration change) const noexcept {

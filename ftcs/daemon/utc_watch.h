@@ -33,7 +33,7 @@ class UtcWatch {
   /// Once a second.
   void on_time(std::int64_t utc_s);
   /// Whether a reading of the reference may steer. `event`: the same instant on an oscillator that
-  /// nobody steers; `utc_ns`: on the system clock.
+  /// nobody steers and that stands still while the machine sleeps; `utc_ns`: on the system clock.
   [[nodiscard]] bool admits(ReferenceTime reference, FreeRunningTime event, std::int64_t utc_ns);
   /// Why nothing has been followed so far, as a sentence; no value: something has, or nothing came.
   [[nodiscard]] std::optional<std::string> refusal() const;

@@ -212,5 +212,28 @@ TEST_F(WrongEpoch, a_machine_that_slept_follows_again) {
   EXPECT_NEAR(kernel.system.time_ns - kernel.ideal_ns, 0.0, 1'000.0);
 }
 
+// An adapter's clock goes on meanwhile.
+TEST_F(WrongEpoch, a_machine_that_slept_follows_by_an_adapters_clock_as_before) {
+  choose(ClockKind::kPhc);
+  ptp.follower.first_step = true;
+  kernel.reference_ahead = kTai + 0.5 * kSecond;
+  ptp.duration = Duration::from_ns(60 * kSecond);
+  constexpr std::int64_t kMinute = 60'000'000'000;
+  const double start = kernel.ideal_ns;
+  kernel.on_second = [&] {
+    if (kernel.slept_ns > 0 || kernel.ideal_ns - start < 20 * kSecond) return;
+    kernel.slept_ns = kMinute;
+    const double truly = static_cast<double>(kMinute) + 0.4 * kSecond;
+    kernel.ideal_ns += truly;
+    kernel.phc.advance(truly);
+    kernel.system.time_ns += static_cast<double>(kMinute);
+  };
+  EXPECT_EQ(follow_network(), kSuccess) << said << errors;
+  EXPECT_GT(kernel.slept_ns, 0);
+  EXPECT_EQ(said.find("another program"), std::string::npos) << said;
+  EXPECT_EQ(said.find("not followed"), std::string::npos) << said;
+  EXPECT_NEAR(kernel.phc.time_ns - kernel.ideal_ns, kernel.reference_ahead, 1'000.0);
+}
+
 }  // namespace
 }  // namespace ftcs::daemon

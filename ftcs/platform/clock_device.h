@@ -58,6 +58,10 @@ class ClockDevice {
   /// Of set_rate(): CLOCK_REALTIME ±10 %, a hardware clock what its driver allows
   /// (PTP_CLOCK_GETCAPS).
   [[nodiscard]] RateLimits rate_limits() const noexcept { return limits_; }
+  /// How long the machine has been asleep so far: CLOCK_MONOTONIC and _RAW stood still meanwhile.
+  [[nodiscard]] std::int64_t slept_ns() noexcept {
+    return kernel_->clock_ns(CLOCK_BOOTTIME) - kernel_->clock_ns(CLOCK_MONOTONIC);
+  }
   [[nodiscard]] bool is_system() const noexcept { return id_ == CLOCK_REALTIME; }
   /// "CLOCK_REALTIME", "/dev/ptp0".
   [[nodiscard]] const std::string& name() const noexcept { return name_; }

@@ -63,6 +63,7 @@ KernelClock::KernelClock(ClockDevice device, const RateLimits& limits, bool may_
     return;
   }
   held_rate_ = tracking_rate_ = *rate;
+  slept_ns_ = device_.slept_ns();
   const LocalTime local = local_of(reading->clock_ns);
   const FreeRunningTime free = device_.is_system() ? FreeRunningTime::from_ns(reading->raw_ns)
                                                    : relabel<FreeRunningTime>(local);
@@ -169,7 +170,12 @@ bool KernelClock::look() noexcept {
   if (!now) return go_on_unread();
   if (deviation_of(*now).is_step && confirm_step(*now)) return go_on_unread();
   const Deviation deviation = deviation_of(*now);
-  if (deviation.is_step) {
+  if (const std::int64_t slept = newly_slept_ns(); slept > 0 && !device_.is_system()) {
+    // The adapter's clock went on, or stood still with the machine: either way by itself.
+    const auto length = Duration::from_whole_ns(slept);
+    if (deviation.by > length.half()) ran_asleep_ += length;
+    rate_steps_.restart();
+  } else if (deviation.is_step) {
     note_leap_or_step(deviation, *now);
   } else if (device_.is_system()) {
     const Duration seen = wander_ + beyond_bracket(deviation.by - wander_, *now);

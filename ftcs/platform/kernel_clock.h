@@ -78,6 +78,9 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   /// Makes the leap itself, where the kernel is not asked to. Local time goes on.
   [[nodiscard]] std::optional<ClockError> leap_now(int leap) noexcept;
 
+  /// How long the free-running face has gone on while the machine slept, as the machine counts it.
+  [[nodiscard]] Duration ran_asleep() const noexcept { return ran_asleep_; }
+
   /// Asks the kernel whether its frequency is still ours, and reports that and everything else
   /// once.
   [[nodiscard]] ForeignSteering take_foreign_steering() noexcept;
@@ -101,6 +104,14 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] Result<ClockDevice::Reading, ClockError> read_device() noexcept;
   [[nodiscard]] bool look() noexcept;
   [[nodiscard]] bool go_on_unread() noexcept;
+  // Since the last look; two readings a moment apart tell it. CLOCK_MONOTONIC_RAW stood still.
+  [[nodiscard]] std::int64_t newly_slept_ns() noexcept {
+    constexpr std::int64_t kShortestNs = 1'000'000;
+    const std::int64_t newly = device_.slept_ns() - slept_ns_;
+    if (newly < kShortestNs) return 0;
+    slept_ns_ += newly;
+    return newly;
+  }
   [[nodiscard]] Deviation deviation_of(const ClockDevice::Reading& now) const noexcept;
   [[nodiscard]] std::optional<ClockError> confirm_step(ClockDevice::Reading& now) noexcept;
   void take(const ClockDevice::Reading& now, FreeRunningTime instant) noexcept;
@@ -136,6 +147,8 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   std::int64_t latest_raw_ns_ = 0;
   std::int64_t latest_width_ns_ = 0;
   std::int64_t usual_width_ns_ = 0;
+  std::int64_t slept_ns_ = 0;
+  Duration ran_asleep_{};
   Duration wander_{};  // of CLOCK_REALTIME from what was commanded, at the last look
   // The reading that says best what the free-running face shows when CLOCK_MONOTONIC_RAW shows
   // something: not the last one, if that was wide.

@@ -294,6 +294,31 @@ TEST_P(KernelClockTest, survives_a_step_by_somebody_else) {
   }
 }
 
+// CLOCK_MONOTONIC_RAW stood still, the adapter did not; how long the machine slept it knows by a
+// calendar clock of whole seconds.
+TEST(KernelClock, a_hardware_clock_that_went_on_while_the_machine_slept_was_stepped_by_nobody) {
+  FakeClocks kernel;
+  auto device = ClockDevice::open_phc(kernel, "/dev/ptp0", ClockAccess::kSteer);
+  KernelClock clock(std::move(*device));
+  ASSERT_TRUE(clock.apply(hold(10.0)).ok());
+  const ClockReading start = clock.read();
+  const double began = kernel.phc.time_ns;
+  kernel.run(50 * kMillisecond);
+  kernel.slept_ns += 2'000'000'000;
+  kernel.phc.advance(2.7 * kSecond);
+  kernel.run(50 * kMillisecond);
+  EXPECT_FALSE(clock.take_foreign_steering().step.has_value());
+  EXPECT_EQ(clock.foreign_steps(), 0U);
+  const ClockReading now = clock.read();
+  EXPECT_NEAR((now.local - start.local).ns(), kernel.phc.time_ns - began, 2'000.0);
+  EXPECT_NEAR((now.free_running - start.free_running).ns(),
+              (kernel.phc.time_ns - began) / (1.0 + 10e-6), 2'000.0);
+  // And somebody's step afterwards is one.
+  kernel.run(50 * kMillisecond);
+  kernel.phc.time_ns += 0.5 * kSecond;
+  EXPECT_TRUE(clock.take_foreign_steering().step.has_value());
+}
+
 TEST(KernelClock, takes_the_announced_leap_of_the_kernel_and_local_time_goes_on) {
   for (const int leap : {1, -1}) {
     FakeClocks kernel;

@@ -116,6 +116,20 @@ void vptp_clock_jump(struct vptp_clock *c, s64 ns)
 	vptp_pins_changed(c);
 }
 
+/* Raw time stood still for so long, and this clock did not. */
+void vptp_clock_slept(struct vptp_clock *c, s64 ns)
+{
+	unsigned long flags;
+	u64 raw = ktime_get_raw_ns();
+
+	spin_lock_irqsave(&c->lock, flags);
+	walk(c, raw);
+	rebase(c, raw);
+	c->raw -= ns;
+	spin_unlock_irqrestore(&c->lock, flags);
+	vptp_pins_changed(c);
+}
+
 s64 vptp_clock_adj_ppt(struct vptp_clock *c)
 {
 	return to_ppt(c->adj);

@@ -25,6 +25,9 @@ int vptp_max_adj = 62499999;
 module_param_named(max_adj, vptp_max_adj, int, 0444);
 MODULE_PARM_DESC(max_adj, "largest adjustment, ppb");
 
+module_param_named(sleep_extra_ns, vptp_sleep_extra_ns, int, 0644);
+MODULE_PARM_DESC(sleep_extra_ns, "a sleep is so much longer than it is taken for");
+
 struct vptp_port vptp_ports[VPTP_MAX_PORTS];
 unsigned int vptp_num_ports;
 
@@ -59,6 +62,7 @@ static void remove_all(void)
 {
 	unsigned int i;
 
+	vptp_sleep_end();
 	vptp_truth_remove();
 	for (i = 0; i < vptp_num_ports; i++)
 		vptp_port_unregister(&vptp_ports[i]);
@@ -93,6 +97,7 @@ static int __init vptp_init(void)
 		return -EINVAL;
 	}
 	prandom_seed_state(&state, seed);
+	vptp_sleep_begin();
 	vptp_num_ports = 2 * pairs;
 	for (i = 0; i < vptp_num_ports; i++)
 		init_port(i);

@@ -97,7 +97,7 @@ struct vptp_port {
 extern struct vptp_port vptp_ports[VPTP_MAX_PORTS];
 extern unsigned int vptp_num_ports;
 extern bool vptp_cross, vptp_extended;
-extern int vptp_max_adj;
+extern int vptp_max_adj, vptp_sleep_extra_ns;
 u32 vptp_random(void);
 s64 vptp_gauss(u32 sigma);
 static inline bool vptp_chance(u32 permille)
@@ -111,6 +111,7 @@ void vptp_clock_unregister(struct vptp_clock *c);
 s64 vptp_clock_at(struct vptp_clock *c, u64 raw);
 u64 vptp_clock_reaches(struct vptp_clock *c, s64 ns);
 void vptp_clock_jump(struct vptp_clock *c, s64 ns);
+void vptp_clock_slept(struct vptp_clock *c, s64 ns);
 void vptp_clock_set_osc(struct vptp_clock *c, s64 ppt);
 s64 vptp_clock_adj_ppt(struct vptp_clock *c);
 
@@ -120,6 +121,10 @@ void vptp_pins_stop(struct vptp_clock *c);
 void vptp_pins_changed(struct vptp_clock *c);
 int vptp_pins_enable(struct ptp_clock_info *info, struct ptp_clock_request *rq,
 		     int on);
+
+/* sleep.c */
+void vptp_sleep_begin(void);
+void vptp_sleep_end(void);
 
 /* stamps.c */
 bool vptp_is_event_message(const struct sk_buff *skb, bool l2_only);
