@@ -83,9 +83,9 @@ class Evidence {
     return lane_of(lowest, place, best_cost);
   }
 
-  /// Writes weights that lean to the wilder models, for the deviation: w_i times Grid::kLean a place, sum
-  /// one. Which of two models that explain the messages alike is right cannot be told, and the
-  /// calmer one is the better bet for the mean; the deviation answers for the other.
+  /// Writes weights that lean to the wilder models, for the deviation: w_i times Grid::kLean a
+  /// place, sum one. Which of two models that explain the messages alike is right cannot be told,
+  /// and the calmer one is the better bet for the mean; the deviation answers for the other.
   static void lean(const Row& weight, Row& leaning) noexcept {
     V sum{};
     for (std::size_t i = 0; i < kSize; i += kStep) {

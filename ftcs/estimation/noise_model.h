@@ -47,7 +47,7 @@ struct FullGrid {
   /// Each model against the calmer one beside it, where the deviation is concerned. Where a wander
   /// is just too slow to be seen, 3 sigma held 96 to 98 % of the errors without it.
   static constexpr double kLean = 1.7;
-  static constexpr std::size_t kSudden = 25;   ///< from here on models explain any single message
+  static constexpr std::size_t kSudden = 25;  ///< from here on models explain any single message
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return static_cast<double>(i) - static_cast<double>(kStart);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // World: an oscillator whose wander is about as slow as what the messages so far can tell from none
-// at all; normal noise, two messages a cycle. Oracle: the truth. What is stated must hold there too:
-// a filter that bets on a calm oscillator is off by more than it says.
+// at all; normal noise, two messages a cycle. Oracle: the truth. What is stated must hold there
+// too: a filter that bets on a calm oscillator is off by more than it says.
 #include <array>
 #include <cmath>
 #include <memory>
