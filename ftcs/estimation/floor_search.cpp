@@ -87,15 +87,20 @@ void FloorSearch::begin() noexcept {
 /// True: wanted_ and in_recent_ say which. Windows grow until one holds all
 /// there is.
 bool FloorSearch::next_window() noexcept {
+  if (holds_window()) return true;
+  if (in_recent_ || record_.stride() == 1) return false;
+  in_recent_ = true;
+  wanted_ = kShortestWindow;
+  return holds_window();
+}
+
+/// Of the wanted length, or all there is.
+bool FloorSearch::holds_window() const noexcept {
   const std::size_t longest = in_recent_ ? 64 : 128;
   const std::size_t held =
       in_recent_ ? std::min(recent_.size(Direction::kForward), recent_.size(Direction::kBackward))
                  : std::min(record_.size(Direction::kForward), record_.size(Direction::kBackward));
-  if (held >= kFewestEntries && wanted_ <= longest && wanted_ / 2U < held) return true;
-  if (in_recent_ || record_.stride() == 1) return false;
-  in_recent_ = true;
-  wanted_ = kShortestWindow;
-  return next_window();
+  return held >= kFewestEntries && wanted_ <= longest && wanted_ / 2U < held;
 }
 
 void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {

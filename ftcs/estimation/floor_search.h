@@ -66,6 +66,7 @@ class FloorSearch {
  private:
   void begin() noexcept;
   [[nodiscard]] bool next_window() noexcept;
+  [[nodiscard]] bool holds_window() const noexcept;
   void fit_window(const Rival& rival, double least_noise) noexcept;
   void end(const Rival& rival) noexcept;
   [[nodiscard]] PerDirection<RecordWindow> windows(std::size_t wanted, bool recent) const noexcept;
