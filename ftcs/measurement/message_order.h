@@ -18,8 +18,7 @@ class MessageOrder {
   enum class Verdict : std::uint8_t { kNews, kDuplicate, kImplausible, kNewEpoch };
 
   /// kDuplicate: older on both clocks, or the same; kImplausible: newer on one of them alone;
-  /// kNewEpoch: the third refused one that is newer than the refused ones of its direction before
-  /// it, where no message of those directions was news meanwhile.
+  /// kNewEpoch: the third refused one that is newer than the refused ones before it.
   [[nodiscard]] Verdict judge(const TimestampPair& message) noexcept {
     const Stamps pair{message.reference.since_epoch().floor_ns(),
                       message.free_running.since_epoch().floor_ns()};
@@ -35,7 +34,7 @@ class MessageOrder {
       side.refused = 1;
       side.candidate = pair;
     }
-    if (sides_.forward.refused + sides_.backward.refused >= kRefusals && side.refused > 1) {
+    if (side.refused >= kRefusals) {
       reset();
       side = {pair, pair, true, 0};
       return Verdict::kNewEpoch;
@@ -58,8 +57,8 @@ class MessageOrder {
     bool seen = false;
     std::uint8_t refused = 0;
   };
-  /// Two messages may overtake each other on the way; three in order are a new epoch, two of them
-  /// of one direction.
+  /// Two messages may overtake each other on the way; three in order are a new
+  /// epoch.
   static constexpr std::uint8_t kRefusals = 3;
 
   [[nodiscard]] static bool newer(const Stamps& a, const Stamps& b) noexcept {

@@ -40,38 +40,6 @@ TEST(MessageOrder, accepts_that_a_clock_was_set_back) {
   EXPECT_EQ(order.judge(pair_at(3'100, 14'000)), Verdict::kNews);
 }
 
-TEST(MessageOrder, both_directions_together_tell_that_a_clock_was_set_back) {
-  MessageOrder order;
-  const auto back_at = [](std::int64_t reference_ns, std::int64_t free_ns) {
-    TimestampPair pair = pair_at(reference_ns, free_ns);
-    pair.direction = Direction::kBackward;
-    return pair;
-  };
-  (void)order.judge(pair_at(10'000, 10'000));
-  (void)order.judge(back_at(10'500, 10'500));
-  EXPECT_EQ(order.judge(pair_at(100, 11'000)), Verdict::kImplausible);
-  EXPECT_EQ(order.judge(back_at(600, 11'500)), Verdict::kImplausible);
-  EXPECT_EQ(order.judge(pair_at(1'100, 12'000)), Verdict::kNewEpoch);
-  EXPECT_EQ(order.judge(back_at(1'600, 12'500)), Verdict::kNews);
-}
-
-// One overtaken message of each direction, again and again.
-TEST(MessageOrder, overtaking_in_both_directions_is_no_new_epoch) {
-  MessageOrder order;
-  for (std::int64_t at = 1'000; at < 20'000; at += 1'000) {
-    for (const Direction direction : {Direction::kForward, Direction::kBackward}) {
-      TimestampPair pair = pair_at(at, at);
-      pair.direction = direction;
-      EXPECT_EQ(order.judge(pair), Verdict::kNews);
-    }
-    for (const Direction direction : {Direction::kForward, Direction::kBackward}) {
-      TimestampPair pair = pair_at(at - 500, at - 500);
-      pair.direction = direction;
-      EXPECT_EQ(order.judge(pair), Verdict::kDuplicate);
-    }
-  }
-}
-
 TEST(MessageOrder, one_absurd_stamp_does_not_block_what_follows) {
   MessageOrder order;
   (void)order.judge(pair_at(1'000, 1'000));
