@@ -74,7 +74,7 @@ void FloorEstimator::record(const Observation& seen, double rate) noexcept {
 }
 
 double FloorEstimator::update(const Observation& seen, double rate) noexcept {
-  adopted_ = jumped_ = false;
+  adopted_ = false;
   double credit = 0.0;
   said_ = 0.0;
   if (locked_) credit = follow(seen);
@@ -178,7 +178,6 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (jump == JumpWatch::Verdict::kJumped && shows) {
     bank_.start(jumps_.estimate());
-    jumped_ = true;
     detector_.clear();
     jumps_.clear();
     search_.alarm(kLooksEarly);

@@ -69,8 +69,6 @@ class FloorEstimator {
 
   /// Messages of both directions have been seen there since.
   [[nodiscard]] bool proven() const noexcept;
-  /// The last message was taken for the end of the floor and the begin of another.
-  [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
 
@@ -140,7 +138,6 @@ class FloorEstimator {
   int early_ = 0;  ///< messages for which an early one is remembered
   bool locked_ = false;
   bool adopted_ = false;
-  bool jumped_ = false;
 };
 
 }  // namespace ftcs::estimation

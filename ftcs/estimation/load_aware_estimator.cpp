@@ -69,21 +69,14 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
-/// The first picture, which explained the message, is so sharp that the offset of the floor is
-/// none.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::contradicts() const noexcept {
-  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
-  return noise < kFarApart * std::abs(floor_.estimate().x - plain_.estimate().x);
-}
-
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
-  const bool contradicts = this->contradicts();
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const bool contradicts = noise < kFarApart * apart;
   const bool sharp =
       contradicts || noise < kSharp * floor_.scale() || noise < kShort * floor_.mean_wait();
   const bool sharper = kSharper * noise < floor_.scale();
@@ -159,8 +152,6 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   } else if (followed && floor_.locked()) {
     compare(credit, own);
   }
-  // A floor that leaps away from what the first picture explains was led astray.
-  if (floor_.jumped() && credit > 0.5 && contradicts()) floor_.unlock();
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();

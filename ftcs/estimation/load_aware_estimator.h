@@ -86,7 +86,6 @@ class LoadAwareEstimator {
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   void start_floor() noexcept;
-  [[nodiscard]] bool contradicts() const noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
 

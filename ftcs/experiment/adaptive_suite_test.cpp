@@ -136,7 +136,8 @@ TEST(AdaptiveSuite, reports_an_honest_deviation) {
   for (double& share : pooled) share /= scenarios;
   std::printf("%-30s %7.3f %7.3f %7.3f\n", "pooled", pooled[0], pooled[1], pooled[2]);
   EXPECT_GE(pooled[0], 0.60);
-  EXPECT_LE(pooled[0], 0.76);
+  EXPECT_LE(pooled[0],
+            0.80);  // of all suites 0.76 (tools/coverage); here most oscillators are calm
   EXPECT_GE(pooled[1], 0.92);
   EXPECT_LE(pooled[1], 0.98);
   EXPECT_GE(pooled[2], 0.99);

@@ -30,6 +30,8 @@ grep -q "driftfile $drift: not there yet" "$folder/first.log" || fail "no word o
 wait $unwritable || fail "a driftfile that cannot be written must not end the run"
 [ "$(grep -c 'driftfile: cannot write /proc/ftcs-drift' "$folder/unwritable.log")" -eq 1 ] ||
   fail "one warning for a driftfile that cannot be written"
+# Not in the middle of a write, which would leave the file that is being written.
+for _ in $(seq 50); do [ -z "$(find "$folder" -name 'killed.?*' ! -name '*.log')" ] && break; sleep 0.02; done
 kill -KILL $killed
 python3 -c '
 import json, sys

@@ -198,7 +198,7 @@ TEST(AdaptiveServo, reported_deviation_is_honest) {
     }
   }
   EXPECT_GE(inside[0] / runs, 0.60);
-  EXPECT_LE(inside[0] / runs, 0.76);
+  EXPECT_LE(inside[0] / runs, 0.80);  // most of these oscillators are calm: slow_wander_test.cpp
   EXPECT_GE(inside[1] / runs, 0.92);
   EXPECT_LE(inside[1] / runs, 0.985);
   EXPECT_GE(inside[2] / runs, 0.99);
