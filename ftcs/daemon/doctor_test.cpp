@@ -21,9 +21,7 @@ using diagnosis::Cause;
 class Doctor : public testing::Test {
  protected:
   Doctor() {
-    kernel.phc_index = 0;
-    kernel.timestamping |=
-        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    kernel.add_adapter_clock();
     kernel.phc.time_ns = kTai;
     options.interface = options.socket.interface = "nowhere0";
     options.clock.kind = ClockKind::kPhc;

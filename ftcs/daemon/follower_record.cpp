@@ -20,6 +20,7 @@ constexpr Nanoseconds kLargestOffset{1'000'000'000};
 /// A UTC offset that is put right moves the reference by a second to the nanosecond, seen with
 /// noise.
 constexpr Nanoseconds kNoiseOfASecond{1'000'000};
+constexpr Nanoseconds kLargestMeasured = kLargestOffset + kNoiseOfASecond;
 constexpr std::size_t kKeptRefusals = 8;
 
 StepPolicy step_policy(const PtpOptions& options) {
@@ -77,10 +78,10 @@ std::string plan_text(const JumpPlan& plan) {
 /// Every limit that stands in the way: with one of them lifted the next would be met.
 std::string jump_text(const node::Note& note, const StepPolicy& step) {
   if (!note.gated) return plan_text(note.plan);
-  const bool far = abs(note.jump) > Duration{kLargestOffset + kNoiseOfASecond};
-  return far && !step.permits(true)
-             ? "not followed (--max-change), and " + plan_text({JumpResponse::kRefused, {}})
-             : "not followed (--max-change)";
+  const bool far = abs(note.jump) > Duration{kLargestMeasured};
+  std::string text = "not followed (--max-change)";
+  if (far && !step.permits(true)) text += ", and " + plan_text({JumpResponse::kRefused, {}});
+  return text;
 }
 
 std::string foreign_text(const node::Note& note) {
@@ -107,7 +108,7 @@ node::ClockFollowerConfig follower_config(const PtpOptions& options, bool hardwa
   config.servo.adaptive.steering.first_step_allowed = options.follower.first_step;
   config.servo.adaptive.learnt = learnt;
   config.step = step_policy(options);
-  config.largest_offset = kLargestOffset + kNoiseOfASecond;
+  config.largest_offset = kLargestMeasured;
   config.largest_rate_change = options.follower.steering.largest_rate_change;
   follower.peer_to_peer = options.protocol.peer_to_peer();
   follower.filter_is_chosen = options.follower.filter_is_chosen;

@@ -12,9 +12,7 @@ namespace {
 
 struct World {
   World() {
-    kernel.phc_index = 0;
-    kernel.timestamping |=
-        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    kernel.add_adapter_clock();
     options.interface = "eth0";
     options.clock.kind = ClockKind::kPhc;
   }

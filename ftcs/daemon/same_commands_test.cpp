@@ -37,10 +37,8 @@ class RecordingKernel final : public FakeClocks {
  public:
   RecordingKernel() {
     reading_ns = phc_reading_ns = 0;
-    phc_index = 0;
     phc.oscillator = 1.00002;
-    timestamping |=
-        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    add_adapter_clock();
   }
   [[nodiscard]] FreeRunningTime adapter() const {
     return FreeRunningTime::from_ns(kEpoch + std::llround(phc.time_ns));

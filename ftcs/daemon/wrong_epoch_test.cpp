@@ -25,9 +25,7 @@ constexpr std::int64_t kBuilt = FakeClocks::kEpoch / 1'000'000'000 - 86'400;
 class WrongEpoch : public testing::Test {
  protected:
   WrongEpoch() {
-    kernel.phc_index = 0;
-    kernel.timestamping |=
-        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    kernel.add_adapter_clock();
     kernel.phc.time_ns = kTai;
     ptp.interface = ptp.socket.interface = "eth0";
     ptp.management.socket.clear();

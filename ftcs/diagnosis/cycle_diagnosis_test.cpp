@@ -8,21 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "test/support/forbid_allocation.h"
+#include "test/support/good_cycle.h"
 
 namespace ftcs::diagnosis {
 namespace {
-
-CycleSeen good() {
-  CycleSeen seen;
-  seen.state = CycleState::kLocked;
-  seen.drives = seen.expected_drives = 8;
-  seen.working_counter = seen.expected_counter = 24;
-  seen.cycles = 1000;
-  seen.margin_ns = 400e3;
-  seen.gate_ns = 200e3;
-  seen.cycle_ns = 1e6;
-  return seen;
-}
 
 struct Case {
   Cause cause;
@@ -60,7 +49,7 @@ const std::array kCases{
 
 TEST(CycleDiagnosis, each_cause_has_its_sentence) {
   for (const Case& one : kCases) {
-    CycleSeen seen = good();
+    CycleSeen seen = test::good_cycle();
     one.change(seen);
     const Finding found = diagnose(seen);
     EXPECT_EQ(name(found.cause), name(one.cause));
@@ -75,7 +64,7 @@ TEST(CycleDiagnosis, only_a_locked_cycle_is_called_locked) {
   for (const CycleState state :
        {CycleState::kWaiting, CycleState::kAcquiring, CycleState::kCoasting}) {
     for (const Case& one : kCases) {
-      CycleSeen seen = good();
+      CycleSeen seen = test::good_cycle();
       one.change(seen);
       seen.state = state;
       std::array<char, 400> text{};
@@ -86,7 +75,7 @@ TEST(CycleDiagnosis, only_a_locked_cycle_is_called_locked) {
 
 TEST(CycleDiagnosis, a_locked_cycle_with_a_cause_is_not_called_locked) {
   for (const Case& one : kCases) {
-    CycleSeen seen = good();
+    CycleSeen seen = test::good_cycle();
     one.change(seen);
     if (seen.state != CycleState::kLocked) continue;
     std::array<char, 400> text{};
@@ -97,7 +86,7 @@ TEST(CycleDiagnosis, a_locked_cycle_with_a_cause_is_not_called_locked) {
 
 TEST(CycleDiagnosis, the_cyclic_path_touches_no_heap_and_no_more_than_its_room) {
   std::array<char, 40> text{};
-  CycleSeen seen = good();
+  CycleSeen seen = test::good_cycle();
   seen.late = 500;
   std::string_view written;
   {

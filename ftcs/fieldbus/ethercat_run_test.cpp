@@ -7,29 +7,19 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/daemon/exit_code.h"
+#include "test/support/good_cycle.h"
 
 namespace ftcs::daemon {
 namespace {
 
 using diagnosis::CycleSeen;
 
-CycleSeen good() {
-  CycleSeen seen;
-  seen.state = CycleState::kLocked;
-  seen.drives = seen.expected_drives = 8;
-  seen.working_counter = seen.expected_counter = 24;
-  seen.cycles = 1000;
-  seen.margin_ns = 400e3;
-  seen.cycle_ns = 1e6;
-  return seen;
-}
-
 // Whatever else was seen, a script that reads the code and a person who reads the sentence are told
 // the same.
 TEST(EthercatRun, exit_code_zero_and_the_word_locked_go_together) {
   for (unsigned bits = 0; bits < 1U << 9U; ++bits) {
     const auto chosen = [bits](unsigned n) { return (bits >> n & 1U) != 0; };
-    CycleSeen seen = good();
+    CycleSeen seen = test::good_cycle();
     if (chosen(0)) seen.state = CycleState::kCoasting;
     if (chosen(1)) seen.failure = ethercat::FailureKind::kLinkLost;
     if (chosen(2)) seen.has_reference = false;

@@ -10,8 +10,6 @@ namespace ftcs::platform {
 namespace {
 
 constexpr int kSocket = 3;
-constexpr std::uint32_t kHardware =
-    SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
 
 TEST(NetworkInterface, says_which_interface_does_not_exist) {
   FakeKernel kernel;
@@ -30,7 +28,7 @@ TEST(NetworkInterface, refuses_names_that_the_kernel_would_cut_off) {
 
 TEST(NetworkInterface, knows_hardware_stamps_only_with_a_hardware_clock) {
   FakeKernel kernel;
-  kernel.timestamping |= kHardware;
+  kernel.timestamping |= FakeKernel::kHardwareStamps;
   EXPECT_FALSE(interface_capabilities(kernel, kSocket, "eth0")->hardware_timestamps);
   kernel.phc_index = 0;
   EXPECT_TRUE(interface_capabilities(kernel, kSocket, "eth0")->hardware_timestamps);

@@ -21,8 +21,6 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::int64_t kMillisecond = 1'000'000;
-constexpr std::uint32_t kHardware =
-    SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
 
 Bytes message(std::uint8_t sequence) {
   Bytes bytes(44, 0);
@@ -81,8 +79,7 @@ TEST(PtpSocket, closes_what_it_opened_when_opening_fails) {
 TEST(PtpSocket, refuses_hardware_stamps_where_there_are_none) {
   Bench bench;
   EXPECT_EQ(bench.failure(TimestampMode::kHardware), OsErrorKind::kTimestampingUnsupported);
-  bench.kernel.timestamping |= kHardware;
-  bench.kernel.phc_index = 0;
+  bench.kernel.add_adapter_clock();
   bench.kernel.open_errno = EACCES;
   EXPECT_EQ(bench.failure(TimestampMode::kHardware), OsErrorKind::kNotPermitted);
   bench.kernel.open_errno = ENOENT;
@@ -91,8 +88,7 @@ TEST(PtpSocket, refuses_hardware_stamps_where_there_are_none) {
 
 TEST(PtpSocket, takes_the_best_stamps_there_are_and_says_which) {
   Bench hardware;
-  hardware.kernel.timestamping |= kHardware;
-  hardware.kernel.phc_index = 0;
+  hardware.kernel.add_adapter_clock();
   EXPECT_EQ(hardware.open()->receive_stamps(), StampSource::kHardware);
   Bench software;
   EXPECT_EQ(software.open()->receive_stamps(), StampSource::kSoftware);
@@ -175,8 +171,7 @@ TEST(PtpSocket, a_configured_peer_is_the_only_one_that_is_heard) {
 
 TEST(PtpSocket, hardware_stamps_are_passed_on_as_they_are) {
   Bench bench;
-  bench.kernel.timestamping |= kHardware;
-  bench.kernel.phc_index = 0;
+  bench.kernel.add_adapter_clock();
   auto socket = bench.open(TimestampMode::kHardware);
   ASSERT_TRUE(socket.ok());
   const int fd = socket->descriptor(Channel::kEvent);

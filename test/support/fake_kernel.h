@@ -24,6 +24,9 @@ namespace ftcs::platform {
 /// queues, and a switch for every way in which they are known to fail.
 class FakeKernel : public Kernel {
  public:
+  static constexpr unsigned kHardwareStamps =
+      SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+
   struct Packet {
     std::vector<std::uint8_t> bytes;
     std::int64_t software_ns = 0;  ///< 0: the kernel gave no such stamp
@@ -71,6 +74,11 @@ class FakeKernel : public Kernel {
   std::vector<Packet> sent;
   SocketAddress last_destination{};
 
+  /// "eth0" has a hardware clock, and stamps with it.
+  void add_adapter_clock() {
+    timestamping |= kHardwareStamps;
+    phc_index = 0;
+  }
   /// Lets both clocks run on.
   void advance(std::int64_t ns) {
     raw_ns += ns;

@@ -60,9 +60,7 @@ struct FakePtpProgram {
 struct World {
   World() {
     kernel.phc.time_ns = 37e9 + 1e6;
-    kernel.phc_index = 0;
-    kernel.timestamping |=
-        SOF_TIMESTAMPING_TX_HARDWARE | SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
+    kernel.add_adapter_clock();
     options.automatic = true;
     options.port.socket = program.path;
     options.duration = Duration::from_ns(30e9);

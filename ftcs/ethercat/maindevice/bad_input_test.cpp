@@ -16,6 +16,14 @@ class BadInput : public ::testing::Test {
     bench_.configure(config);
     bench_.add_line(3, Nanoseconds{50});
   }
+  /// Each drive is given one object: an SDO download in its bring-up.
+  void configure_one_object() {
+    static constexpr SdoDownload kObject[] = {{{0x6060, 0}, 1, 8}};
+    MainDeviceConfig config;
+    config.clocks.drift_pulses = 10;
+    config.process.objects = kObject;
+    bench_.configure(config);
+  }
   const Failure& bring_up() {
     bench_.bring_up();
     return bench_.main().failure();
@@ -133,11 +141,7 @@ TEST_F(BadInput, a_mailbox_that_no_frame_holds_or_that_holds_no_sdo_is_refused_a
 
 TEST_F(BadInput, a_mailbox_full_of_something_else_does_not_prolong_the_deadline_of_an_sdo) {
   // Each read of a mailbox brings an emergency (CoE service 1), for ever.
-  static constexpr SdoDownload kObject[] = {{{0x6060, 0}, 1, 8}};
-  MainDeviceConfig config;
-  config.clocks.drift_pulses = 10;
-  config.process.objects = kObject;
-  bench_.configure(config);
+  configure_one_object();
   bench_.tamper = [](const FrameView& frame) {
     const Datagram datagram = frame[0];
     if (datagram.command() != Command::kFprd || datagram.data().size() < 64) return;
@@ -155,11 +159,7 @@ TEST_F(BadInput, a_mailbox_full_of_something_else_does_not_prolong_the_deadline_
 
 // An answer is lost, and then the host stands still for longer than the drive has to answer.
 TEST_F(BadInput, a_host_that_stands_still_for_a_second_asks_for_an_sdo_again) {
-  static constexpr SdoDownload kObject[] = {{{0x6060, 0}, 1, 8}};
-  MainDeviceConfig config;
-  config.clocks.drift_pulses = 10;
-  config.process.objects = kObject;
-  bench_.configure(config);
+  configure_one_object();
   bool stood_still = false;
   bench_.tamper = [&](const FrameView& frame) {
     const Datagram datagram = frame[0];
