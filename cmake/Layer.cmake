@@ -65,6 +65,8 @@ function(ftcs_test file)
   target_link_libraries(${target} PRIVATE ${arg_DEPENDS} ${arg_LIBRARIES} ftcs_test_support ftcs_warnings
     GTest::gtest_main)
   ftcs_use_precompiled(${target} test)
+  # What is tested is optimised in full, in its layer: a test is compiled once for each time that it runs.
+  target_compile_options(${target} PRIVATE $<$<CONFIG:RelWithDebInfo>:-O1>)
   if(NOT arg_LABEL)
     set(arg_LABEL unit)
   endif()
