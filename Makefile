@@ -13,6 +13,8 @@
 
 CMAKE_FLAGS ?=
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+# Those that wait for a network are many: one more at a time than there are processors.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
 DEMO_FLAGS ?=
 FUZZ_SECONDS ?= 60
 JOB ?=
@@ -40,7 +42,7 @@ demo: build
 
 test: deps-test configure
 	@cmake --build build -j $(JOBS)
-	@ctest --test-dir build -j $(JOBS) --output-on-failure -LE '^(slow|vm)$$'
+	@ctest --test-dir build -j $(TEST_JOBS) --output-on-failure -LE '^(slow|vm)$$'
 
 test-all: test
 	@ctest --test-dir build -j $(JOBS) --output-on-failure -L slow

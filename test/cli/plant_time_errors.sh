@@ -72,16 +72,16 @@ if [ "$(id -u)" -eq 0 ] && command -v ip > /dev/null && ip netns add "ftcs-pe$$"
   "${inside[@]}" "$here/../doctor/transmitter.py" gm > "$folder/stranger.log" 2>&1 &
   stranger=$!
   pids+=("$stranger")
-  refused 3 "not authentic" --plant-time ptp:pt --ptp-config "$folder/keys.conf" --bus-mode external --await-lock 8
+  refused 3 "not authentic" --plant-time ptp:pt --ptp-config "$folder/keys.conf" --bus-mode external --await-lock 5
   kill "$stranger"
   "${inside[@]}" "$here/../doctor/transmitter.py" gm unicast_ip=10.77.0.1 \
     unicast="$(ip -n "$space" -br link show pt | grep -oE '([0-9a-f]{2}:){5}[0-9a-f]{2}')" > "$folder/unicast.log" 2>&1 &
   stranger=$!
   pids+=("$stranger")
-  refused 3 "not locked" --plant-time ptp:pt --bus-mode external --await-lock 6
+  refused 3 "not locked" --plant-time ptp:pt --bus-mode external --await-lock 4
   kill "$stranger"
   "${inside[@]}" "$here/../doctor/transmitter.py" gm flags=0 ahead=-1700000000 > "$folder/transmitter.log" 2>&1 &
   pids+=($!)
-  refused 3 "an arbitrary epoch is no plant time" --plant-time ptp:pt --bus-mode external --await-lock 12
+  refused 3 "an arbitrary epoch is no plant time" --plant-time ptp:pt --bus-mode external --await-lock 7
 fi
 echo "ok"
