@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The world: our port and its neighbour, 700 ns of cable apart. The neighbour's clock began at
-// another time and is 100 ppm fast; it answers 10 ms after it was asked, unless a test says
-// otherwise. All messages pass as octets.
+// The world: peer_delay_fixture.h.
 #include "ftcs/ptp/peer_delay.h"
 
 #include <vector>
@@ -10,95 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "test/support/forbid_allocation.h"
+#include "test/support/peer_delay_fixture.h"
 
-namespace ftcs::ptp {
+namespace ftcs::ptp::peer_delay_test {
 namespace {
-using namespace std::chrono_literals;
-
-const PortIdentity kUs{ClockIdentity::from_mac({2, 0, 0, 0, 0, 1}), 1};
-const PortIdentity kNeighbour{ClockIdentity::from_mac({2, 0, 0, 0, 0, 2}), 1};
-const PortIdentity kStranger{ClockIdentity::from_mac({2, 0, 0, 0, 0, 3}), 1};
-constexpr Nanoseconds kLink = 700ns;
-constexpr Nanoseconds kTurnAround = 10ms;
-
-FreeRunningTime ours(Nanoseconds time) { return FreeRunningTime{Duration{time + 77s}}; }
-ReferenceTime neighbours(Nanoseconds time) {
-  return ReferenceTime{scale(Duration{time}, Rate::from_ppm(100.0)) + Duration{1'800'000'000s}};
-}
-
-template <class T>
-std::vector<T> of(const ActionList& actions) {
-  std::vector<T> found;
-  for (const Action& action : actions) {
-    if (const T* one = std::get_if<T>(&action)) found.push_back(*one);
-  }
-  return found;
-}
-
-class PeerDelayTest : public testing::Test {
- protected:
-  explicit PeerDelayTest(const PeerDelayConfig& config = {}) : peer_(config) {
-    ActionList ignored;
-    port_.change_state(PortState::kListening, PortEvent::kInitComplete, ignored);
-    peer_.start(ours(0s));
-  }
-
-  /// Sends the request that is due; its sequence id.
-  std::uint16_t ask(Nanoseconds at) {
-    ActionList actions;
-    peer_.on_timer(ours(at), port_, actions);
-    const auto sent = of<SendMessage>(actions);
-    EXPECT_EQ(sent.size(), 1U);
-    if (sent.empty()) return 0;
-    EXPECT_EQ(sent[0].destination, Destination::kNeighbour);
-    EXPECT_EQ(sent[0].type, MessageType::kPdelayReq);
-    return sent[0].sequence_id;
-  }
-  ActionList stamp(std::uint16_t sequence_id, Nanoseconds at) {
-    ActionList actions;
-    peer_.on_sent({MessageType::kPdelayReq, sequence_id, {}}, ours(at), port_, actions);
-    return actions;
-  }
-  ActionList hand_over(const Message& message, Nanoseconds at) {
-    ActionList actions;
-    const auto bytes = encode(message);
-    EXPECT_TRUE(bytes.ok());
-    if (const auto read = port_.read(bytes->view())) {
-      peer_.on_message(*read, ours(at), port_, actions);
-    }
-    return actions;
-  }
-  static Message message(std::uint16_t sequence_id, const Body& body,
-                         const PortIdentity& source = kNeighbour) {
-    Message message;
-    message.header.source = source;
-    message.header.sequence_id = sequence_id;
-    message.body = body;
-    return message;
-  }
-  static Message response(std::uint16_t sequence_id, Nanoseconds received,
-                          const PortIdentity& source = kNeighbour) {
-    Message answer = message(sequence_id, PdelayResp{neighbours(received), kUs}, source);
-    answer.header.flags = flag::kTwoStep;
-    return answer;
-  }
-  static Message follow_up(std::uint16_t sequence_id, Nanoseconds sent,
-                           const PortIdentity& source = kNeighbour) {
-    return message(sequence_id, PdelayRespFollowUp{neighbours(sent), kUs}, source);
-  }
-  /// A whole exchange that begins at `at`.
-  std::vector<EmitPeerDelay> exchange(Nanoseconds at, const PortIdentity& source = kNeighbour) {
-    const std::uint16_t id = ask(at);
-    static_cast<void>(stamp(id, at));
-    const Nanoseconds left = at + kLink + kTurnAround;
-    static_cast<void>(hand_over(response(id, at + kLink, source), left + kLink));
-    return of<EmitPeerDelay>(hand_over(follow_up(id, left, source), left + 2 * kLink));
-  }
-  [[nodiscard]] std::uint64_t count(Counter counter) const { return port_.counters()[counter]; }
-
-  Port port_{PortConfig{.identity = kUs}};
-  PeerDelay peer_;
-};
 
 TEST_F(PeerDelayTest, first_exchange_takes_the_turn_around_as_it_is_the_second_knows_the_rate) {
   const auto first = exchange(0s);
@@ -452,49 +365,5 @@ TEST_F(PeerDelayTest, allocates_nothing) {
   }
 }
 
-class CapablePort : public PeerDelayTest {
- protected:
-  CapablePort() : PeerDelayTest(config()) {}
-  static PeerDelayConfig config() {
-    PeerDelayConfig config;
-    config.capability_needed = true;
-    config.highest = 800ns;
-    config.allowed_losses = 3;
-    return config;
-  }
-};
-
-TEST_F(CapablePort, needs_an_answer_and_a_rate) {
-  EXPECT_FALSE(peer_.capable());
-  static_cast<void>(exchange(0s));
-  EXPECT_FALSE(peer_.capable()) << "no rate yet";
-  static_cast<void>(exchange(1s));
-  EXPECT_TRUE(peer_.capable());
-}
-
-TEST_F(CapablePort, a_delay_above_the_threshold_is_a_bridge_that_speaks_no_802_1as) {
-  static_cast<void>(exchange(0s));
-  static_cast<void>(exchange(1s));
-  const auto id = ask(2s);
-  static_cast<void>(stamp(id, 2s));
-  const Nanoseconds left = 2s + 900ns + kTurnAround;
-  static_cast<void>(hand_over(response(id, 2s + 900ns), left + 900ns));
-  static_cast<void>(hand_over(follow_up(id, left), left + 1us));
-  EXPECT_FALSE(peer_.capable());
-  static_cast<void>(exchange(3s));
-  EXPECT_TRUE(peer_.capable());
-}
-
-TEST_F(CapablePort, is_lost_with_the_answers) {
-  static_cast<void>(exchange(0s));
-  static_cast<void>(exchange(1s));
-  for (int i = 2; i < 6; ++i) {
-    EXPECT_TRUE(peer_.capable()) << i;
-    static_cast<void>(stamp(ask(1s * i), 1s * i));
-  }
-  static_cast<void>(ask(6s));
-  EXPECT_FALSE(peer_.capable());
-}
-
 }  // namespace
-}  // namespace ftcs::ptp
+}  // namespace ftcs::ptp::peer_delay_test

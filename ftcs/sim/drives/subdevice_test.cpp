@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Length: one world, and each register of a SubDevice in it.
 // The world: SubDevices in a line or a tree with perfect crystals, 300 ns a hop, one datagram per
 // frame every 100 us. Expectations come from ETG.1000.4 and .6, not from the code.
 #include "ftcs/sim/drives/subdevice.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
-#include "ftcs/ethercat/wire/sii.h"
 #include "test/support/forbid_allocation.h"
 #include "test/support/wire_bench.h"
 
@@ -91,35 +87,6 @@ struct OneDevice : WireBench, ::testing::Test {
   Reply reply_;
 };
 
-TEST(DatagramRules, each_device_counts_a_broadcast_and_moves_its_position_on) {
-  WireBench bench;
-  bench.add_line(3);
-  const auto reply = bench.read({kBrd, 0, reg::kType}, 1);
-  EXPECT_EQ(reply.working_counter, 3);
-  EXPECT_EQ(reply.position, 3);
-  EXPECT_EQ(reply.data[0], 0x11);
-}
-
-TEST(DatagramRules, auto_increment_reaches_exactly_one) {
-  WireBench bench;
-  bench.add_line(3);
-  EXPECT_EQ(bench.write(Target::at_position(kApwr, 1, reg::kStationAddress), std::uint16_t{7})
-                .working_counter,
-            1);
-  EXPECT_EQ(bench.segment()[1].memory().get<std::uint16_t>(reg::kStationAddress), 7);
-  EXPECT_EQ(bench.segment()[0].memory().get<std::uint16_t>(reg::kStationAddress), 0);
-  EXPECT_EQ(bench.read({kFprd, 7, reg::kType}, 1).working_counter, 1);
-  EXPECT_EQ(bench.read({kFprd, 8, reg::kType}, 1).working_counter, 0);
-}
-
-TEST(DatagramRules, a_broadcast_read_ors) {
-  WireBench bench;
-  bench.add_line(2);
-  bench.write(Target::at_position(kApwr, 0, reg::kStationAddress), std::uint16_t{0x0101});
-  bench.write(Target::at_position(kApwr, 1, reg::kStationAddress), std::uint16_t{0x1010});
-  EXPECT_EQ(bench.read({kBrd, 0, reg::kStationAddress}, 2).value<std::uint16_t>(), 0x1111);
-}
-
 TEST_F(OneDevice, read_write_returns_the_old_value_and_counts_three) {
   write(fp(kFpwr, 0x1800), std::uint16_t{0xAAAA});
   const Reply reply = write(fp(kFprw, 0x1800), std::uint16_t{0x5555});
@@ -133,13 +100,6 @@ TEST_F(OneDevice, read_only_registers_stay_and_memory_ends_somewhere) {
   EXPECT_EQ(read(fp(kFprd, reg::kType), 1).data[0], 0x11);
   EXPECT_EQ(read(fp(kFprd, 0x2FFF), 1).working_counter, 1);
   EXPECT_EQ(read(fp(kFprd, 0x2FFF), 2).working_counter, 0);
-}
-
-TEST(DatagramRules, frmw_reads_one_and_writes_the_others) {
-  WireBench bench;
-  bench.add_line(4);
-  bench.write(Target::at_position(kApwr, 0, reg::kStationAddress), kStation);
-  EXPECT_EQ(bench.read(fp(kFrmw, reg::kSystemTime), 8).working_counter, 4);
 }
 
 TEST_F(OneDevice, lrw_counts_three_once_however_many_channels_it_meets) {
@@ -216,35 +176,6 @@ TEST_F(OneDevice, the_eeprom_interface_takes_all_forms_of_access) {
   // The PDI owns it: no access.
   write(fp(kFpwr, reg::kSiiConfiguration), std::uint8_t{1});
   EXPECT_EQ(exchange(fp(kFpwr, reg::kSiiControl), {0, 1, 8, 0, 0, 0}).working_counter, 0);
-}
-
-TEST(SiiImage, of_a_drive_decodes_without_an_error) {
-  const SiiImage image = make_drive_image({1, 2, 3, 4}, 77, true);
-  const auto content = decode_sii(image);
-  ASSERT_TRUE(content) << name(content.error());
-  EXPECT_EQ(content->identity.product, 2U);
-  EXPECT_EQ(content->alias, 77);
-  EXPECT_STREQ(content->device_name.data(), "FTCS modelled servo drive");
-  EXPECT_EQ(content->sync_manager_count, 4U);
-  EXPECT_EQ(content->assign_activate, 0x0300);
-  EXPECT_TRUE(content->coe());
-}
-
-// ETG.2010, category 30: CoE details at byte 5, EoE details at 7, flags at 11.
-TEST(SiiImage, general_category_lies_where_other_masters_look_for_it) {
-  SiiImage image = make_drive_image({1, 2, 3, 4}, 0, true);
-  std::size_t at = sii::kCategoriesWord * 2;
-  while (load<std::uint16_t>(image, at) != sii::kGeneral) {
-    at += 4U + 2U * load<std::uint16_t>(image, at + 2);
-  }
-  const Bytes general = Bytes{image}.subspan(at + 4, 32);
-  EXPECT_EQ(general[5], 0x0D) << "SDO, PDO assignment and configuration";
-  EXPECT_EQ(general[6], 0) << "no FoE";
-  EXPECT_EQ(general[7], 0) << "no EoE";
-  EXPECT_EQ(decode_sii(image)->coe_details, 0x0D);
-  EXPECT_TRUE(decode_sii(image)->logical_read_write_supported);
-  general[11] = 0x02;
-  EXPECT_FALSE(decode_sii(image)->logical_read_write_supported);
 }
 
 TEST_F(OneDevice, a_mapping_may_hold_gaps_of_whole_bytes) {
