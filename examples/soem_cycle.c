@@ -97,17 +97,70 @@ static int compare(const void* a, const void* b) {
   return (left > right) - (left < right);
 }
 
+/* What the run came to, in cycles. */
+static struct {
+  long answered, complete, gated, judged, locked_at, op_at, recoveries;
+  unsigned long long skipped;
+  int in_op;
+} seen = {.locked_at = -1, .op_at = -1};
+
+/* The frame of this cycle: when it left, and whether that is to be believed. */
+static void send_frame(ftcs_cycle_sample* frame, int64_t scheduled, int64_t* usual) {
+  const int64_t sent = now_ns();
+  int64_t took;
+  ecx_send_processdata(&context);
+  took = now_ns() - sent;
+  frame->sent_ns = sent;
+  frame->scheduled_ns = scheduled;
+  frame->has_scheduled = 1;
+  frame->has_reference = took < 2 * *usual; /* else interrupted: nobody knows when it left */
+  *usual += (took - *usual) / 64;
+}
+
+/* Once locked: asks for OP, and again where some left it. */
+static void hold_op(long cycle) {
+  uint16 states;
+  if (seen.locked_at < 0) {
+    seen.locked_at = cycle;
+    context.slavelist[0].state = EC_STATE_OPERATIONAL;
+    ecx_writestate(&context, 0);
+  }
+  if (cycle % 100 != 0) return;
+  states = all_states();
+  seen.in_op = states == EC_STATE_OPERATIONAL;
+  if (seen.in_op && seen.op_at < 0) seen.op_at = cycle;
+  if (!seen.in_op && seen.op_at >= 0) {
+    /* Some left OP: acknowledge first, ask again the next time. */
+    ++seen.recoveries;
+    context.slavelist[0].state =
+        (states & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
+    ecx_writestate(&context, 0);
+  }
+}
+
+static void report(const ftcs_cycle_decision* decision, int32_t law, int expected, long cycles) {
+  long i;
+  printf("%s: %s, locked in cycle %ld, OP in cycle %ld, %s at the end (%ld requests to come "
+         "back), rate %+.3f ppm\n",
+         kLaws[law], ftcs_cycle_state_name(decision->state), seen.locked_at, seen.op_at,
+         seen.in_op ? "all in OP" : "not all in OP", seen.recoveries, decision->rate_ppb * 1e-3);
+  printf("working counter %d in %ld of %ld frames that came back, %ld cycles; %ld cycles gated or lost, "
+         "%llu passed over by stalls\n",
+         expected, seen.complete, seen.answered, cycles, seen.gated, seen.skipped);
+  if (seen.judged == 0) return;
+  for (i = 0; i < seen.judged; ++i) phases[i] = abs(phases[i]);
+  qsort(phases, (size_t)seen.judged, sizeof phases[0], compare);
+  printf("|phase| of the virtual cycle since the lock: p50 %d p99 %d max %d ns\n",
+         phases[seen.judged / 2], phases[seen.judged * 99 / 100], phases[seen.judged - 1]);
+}
+
 /* Runs the cycles; returns non-zero when locked and in OP at the end. */
 static int run(const ftcs_cycle_config* config, double seconds) {
   static ftcs_cycle_servo servo;
   const int expected = context.grouplist[0].outputsWKC * 2 + context.grouplist[0].inputsWKC;
   ftcs_cycle_sample frame;
   ftcs_cycle_decision decision;
-  long cycle, answered = 0, complete = 0, gated = 0, judged = 0, locked_at = -1, op_at = -1;
-  long recoveries = 0;
-  unsigned long long skipped = 0;
-  int in_op = 0;
-  long cycles = (long)(seconds * 1e9 / (double)config->cycle_ns);
+  long cycle, cycles = (long)(seconds * 1e9 / (double)config->cycle_ns);
   int64_t usual = 100000; /* how long a send takes, ns: a moving average */
   const int error = ftcs_cycle_init(&servo, sizeof servo, config);
   if (error != FTCS_CYCLE_OK) {
@@ -119,7 +172,6 @@ static int run(const ftcs_cycle_config* config, double seconds) {
   decision = ftcs_cycle_start(&servo, now_ns());
   for (cycle = 1; cycle <= cycles; ++cycle) {
     const int64_t scheduled = decision.wake_ns;
-    int64_t sent, took;
     int counter = 0;
     sleep_until(scheduled);
 
@@ -131,53 +183,17 @@ static int run(const ftcs_cycle_config* config, double seconds) {
 
     /* Here the application computes its outputs. */
 
-    sent = now_ns();
-    ecx_send_processdata(&context);
-    took = now_ns() - sent;
-    frame.sent_ns = sent;
-    frame.scheduled_ns = scheduled;
-    frame.has_scheduled = 1;
-    frame.has_reference = took < 2 * usual; /* else interrupted: nobody knows when it left */
-    usual += (took - usual) / 64;
-
-    if (counter > 0) ++answered;
-    if (counter == expected) ++complete;
-    if (decision.verdict != FTCS_CYCLE_USED) ++gated;
-    skipped += decision.skipped;
+    send_frame(&frame, scheduled, &usual);
+    seen.answered += counter > 0;
+    seen.complete += counter == expected;
+    seen.gated += decision.verdict != FTCS_CYCLE_USED;
+    seen.skipped += decision.skipped;
     if (decision.state != FTCS_CYCLE_LOCKED) continue;
-    if (locked_at < 0) {
-      locked_at = cycle;
-      context.slavelist[0].state = EC_STATE_OPERATIONAL;
-      ecx_writestate(&context, 0);
-    }
-    if (cycle % 100 == 0) {
-      const uint16 states = all_states();
-      in_op = states == EC_STATE_OPERATIONAL;
-      if (in_op && op_at < 0) op_at = cycle;
-      if (!in_op && op_at >= 0) {
-        /* Some left OP: acknowledge first, ask again the next time. */
-        ++recoveries;
-        context.slavelist[0].state =
-            (states & EC_STATE_ERROR) ? EC_STATE_SAFE_OP + EC_STATE_ACK : EC_STATE_OPERATIONAL;
-        ecx_writestate(&context, 0);
-      }
-    }
-    if (decision.verdict == FTCS_CYCLE_USED) phases[judged++] = (int32_t)decision.phase_error_ns;
+    hold_op(cycle);
+    if (decision.verdict == FTCS_CYCLE_USED) phases[seen.judged++] = (int32_t)decision.phase_error_ns;
   }
-  printf("%s: %s, locked in cycle %ld, OP in cycle %ld, %s at the end (%ld requests to come "
-         "back), rate %+.3f ppm\n",
-         kLaws[config->law], ftcs_cycle_state_name(decision.state), locked_at, op_at,
-         in_op ? "all in OP" : "not all in OP", recoveries, decision.rate_ppb * 1e-3);
-  printf("working counter %d in %ld of %ld frames that came back, %ld cycles; %ld cycles gated or lost, %llu passed over by stalls\n",
-         expected, complete, answered, cycles, gated, skipped);
-  if (judged > 0) {
-    long i;
-    for (i = 0; i < judged; ++i) phases[i] = abs(phases[i]);
-    qsort(phases, (size_t)judged, sizeof phases[0], compare);
-    printf("|phase| of the virtual cycle since the lock: p50 %d p99 %d max %d ns\n",
-           phases[judged / 2], phases[judged * 99 / 100], phases[judged - 1]);
-  }
-  return decision.state == FTCS_CYCLE_LOCKED && in_op;
+  report(&decision, config->law, expected, cycles);
+  return decision.state == FTCS_CYCLE_LOCKED && seen.in_op;
 }
 
 int main(int argc, char** argv) {

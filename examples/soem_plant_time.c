@@ -104,11 +104,27 @@ static int64_t move_bus(int64_t wanted, int64_t in_force) {
   return counter == 1 ? wanted : in_force;
 }
 
+static int configure(ftcs_cycle_servo* servo, ftcs_bus_clock* bus) {
+  ftcs_cycle_config config = ftcs_cycle_default_config();
+  const ftcs_bus_config bus_config = ftcs_bus_default_config(kCycle);
+  config.law = FTCS_CYCLE_ADAPTIVE;
+  config.cycle_ns = kCycle;
+  config.shift_ns = kCycle / 2;
+  return ftcs_cycle_init(servo, sizeof *servo, &config) == FTCS_CYCLE_OK &&
+         ftcs_bus_init(bus, sizeof *bus, &bus_config) == FTCS_BUS_OK;
+}
+
+static int report(const ftcs_bus_decision* moved, const ftcs_cycle_decision* decision) {
+  const int in_op = all_states() == EC_STATE_OPERATIONAL;
+  printf("dc to plant %+.3f us (sigma %.3f us), bus bent by %+.3f ppm, %s\n",
+         (double)moved->dc_to_plant_ns * 1e-3, moved->sigma_ns * 1e-3, moved->rate_ppb * 1e-3,
+         in_op ? "all in OP" : "not all in OP");
+  return in_op && moved->state == FTCS_BUS_LOCKED && decision->state == FTCS_CYCLE_LOCKED;
+}
+
 static int run(double seconds) {
   static ftcs_cycle_servo servo;
   static ftcs_bus_clock bus;
-  ftcs_cycle_config config = ftcs_cycle_default_config();
-  const ftcs_bus_config bus_config = ftcs_bus_default_config(kCycle);
   ftcs_cycle_sample frame;
   ftcs_cycle_decision decision;
   ftcs_bus_sample seen;
@@ -118,11 +134,7 @@ static int run(double seconds) {
   long cycle;
   int asked = 0;
 
-  config.law = FTCS_CYCLE_ADAPTIVE;
-  config.cycle_ns = kCycle;
-  config.shift_ns = kCycle / 2;
-  if (ftcs_cycle_init(&servo, sizeof servo, &config) != FTCS_CYCLE_OK) return 0;
-  if (ftcs_bus_init(&bus, sizeof bus, &bus_config) != FTCS_BUS_OK) return 0;
+  if (!configure(&servo, &bus)) return 0;
   memset(&frame, 0, sizeof frame);
   memset(&seen, 0, sizeof seen);
   memset(&moved, 0, sizeof moved);
@@ -162,13 +174,7 @@ static int run(double seconds) {
     }
     if (asked && cycle % 100 == 0) bring_back(all_states());
   }
-  {
-    const int in_op = all_states() == EC_STATE_OPERATIONAL;
-    printf("dc to plant %+.3f us (sigma %.3f us), bus bent by %+.3f ppm, %s\n",
-           (double)moved.dc_to_plant_ns * 1e-3, moved.sigma_ns * 1e-3, moved.rate_ppb * 1e-3,
-           in_op ? "all in OP" : "not all in OP");
-    return in_op && moved.state == FTCS_BUS_LOCKED && decision.state == FTCS_CYCLE_LOCKED;
-  }
+  return report(&moved, &decision);
 }
 
 int main(int argc, char** argv) {
