@@ -20,18 +20,14 @@ using namespace kickcat;
 
 namespace {
 
-int run(const char* interface, double seconds) {
-  auto [nominal, redundancy] = createSockets(interface, "");
-  auto link = std::make_shared<Link>(nominal, redundancy, [] {});
-  // KickCAT's bring-up gives up on one late frame: a busy host gets more time than a bus would.
-  link->setTimeout(20ms);
-  Bus bus{link};
-  std::vector<uint8_t> image(4096);
+using Drives = std::vector<std::unique_ptr<CoE::CiA::DS402::Drive>>;
+
+/// To SAFEOP; the start of the cycles, on the reference clock.
+nanoseconds bring_up(Bus& bus, Drives& drives, std::vector<uint8_t>& image) {
   bus.init(100ms);
   const nanoseconds start = bus.enableDC(1ms, 500us, 1s);
   bus.requestState(State::PRE_OP);
   bus.waitForState(State::PRE_OP, 3000ms);
-  std::vector<std::unique_ptr<CoE::CiA::DS402::Drive>> drives;
   for (auto& slave : bus.slaves()) {
     drives.push_back(std::make_unique<CoE::CiA::DS402::Drive>(bus, slave));
     drives.back()->configure(CoE::CiA::DS402::control::POSITION_CYCLIC);
@@ -44,15 +40,18 @@ int run(const char* interface, double seconds) {
   bus.requestState(State::SAFE_OP);
   bus.waitForState(State::SAFE_OP, 1000ms);
   for (auto& drive : drives) drive->attach();
+  return start;
+}
 
-  link->setTimeout(2ms);
-  Timer timer{1ms};
-  timer.start(start);
-  long bad = 0;
-  const auto on_error = [&bad](const DatagramState&) { ++bad; };
-  const long cycles = static_cast<long>(seconds * 1000);
+struct Figures {
+  long bad = 0;  ///< datagrams without their working counter
   long locked_at = -1;
   std::size_t operational = 0;
+};
+
+Figures cycle(Bus& bus, Drives& drives, Timer& timer, long cycles) {
+  Figures seen;
+  const auto on_error = [&seen](const DatagramState&) { ++seen.bad; };
   for (long cycle = 0; cycle < cycles; ++cycle) {
     static_cast<void>(timer.wait_next_tick());
     try {
@@ -68,16 +67,33 @@ int run(const char* interface, double seconds) {
       // One a cycle: drives that wait for outputs meanwhile would fault, and rightly so.
       const long left = cycles - 1 - cycle;
       if (left < static_cast<long>(drives.size())) {
-        operational += bus.getCurrentState(bus.slaves().at(static_cast<std::size_t>(left))) ==
-                       State::OPERATIONAL;
+        seen.operational += bus.getCurrentState(bus.slaves().at(static_cast<std::size_t>(left))) ==
+                            State::OPERATIONAL;
       }
     } catch (const std::exception& error) {
       std::fprintf(stderr, "[%ld] %s\n", cycle, error.what());
     }
     for (auto& drive : drives) drive->update();
     bus.sync(timer);
-    if (timer.locked() && locked_at < 0) locked_at = cycle;
+    if (timer.locked() && seen.locked_at < 0) seen.locked_at = cycle;
   }
+  return seen;
+}
+
+int run(const char* interface, double seconds) {
+  auto [nominal, redundancy] = createSockets(interface, "");
+  auto link = std::make_shared<Link>(nominal, redundancy, [] {});
+  // KickCAT's bring-up gives up on one late frame: a busy host gets more time than a bus would.
+  link->setTimeout(20ms);
+  Bus bus{link};
+  std::vector<uint8_t> image(4096);
+  Drives drives;
+  const nanoseconds start = bring_up(bus, drives, image);
+  link->setTimeout(2ms);
+  Timer timer{1ms};
+  timer.start(start);
+  const long cycles = static_cast<long>(seconds * 1000);
+  const Figures seen = cycle(bus, drives, timer, cycles);
   const bool synchronized = bus.isDCSynchronized(1000ns);
   bool enabled = true;
   for (auto& drive : drives) enabled &= drive->isEnabled();
@@ -85,9 +101,11 @@ int run(const char* interface, double seconds) {
       "KickCAT: %zu SubDevices, %zu in OP at the end, enabled %s, clocks within 1 us %s, soft PLL "
       "locked in cycle %ld, "
       "%ld datagrams without their working counter in %ld cycles\n",
-      bus.slaves().size(), operational, enabled ? "yes" : "no", synchronized ? "yes" : "no",
-      locked_at, bad, cycles);
-  return operational == drives.size() && enabled && synchronized && locked_at >= 0 ? 0 : 1;
+      bus.slaves().size(), seen.operational, enabled ? "yes" : "no", synchronized ? "yes" : "no",
+      seen.locked_at, seen.bad, cycles);
+  const bool good =
+      seen.operational == drives.size() && enabled && synchronized && seen.locked_at >= 0;
+  return good ? 0 : 1;
 }
 
 }  // namespace
