@@ -13,6 +13,7 @@
 #include "ftcs/daemon/ptp_receiver.h"
 #include "ftcs/platform/frame_listener.h"
 #include "ftcs/platform/network_interface.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs::daemon {
 namespace {
@@ -175,7 +176,6 @@ bool is_link_up(platform::Kernel& kernel, const std::string& interface) {
 }
 
 std::int64_t utc_s(platform::Kernel& kernel) {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   return kernel.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
 }
 

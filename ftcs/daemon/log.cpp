@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::daemon {
 
 Log::Log(platform::Kernel& kernel, std::FILE* stream, int level)
@@ -16,7 +18,6 @@ Log::Log(platform::Kernel& kernel, std::FILE* stream, int level)
 bool Log::admits(LogLevel level, const char* kind) {
   const bool from_outside = level == LogLevel::kWarning || level == LogLevel::kNotice;
   if (!from_outside) return true;  // errors end a run, samples have a rate of their own
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   const std::int64_t now_ns = kernel_.clock_ns(CLOCK_MONOTONIC);
   const std::int64_t second = now_ns / kNsPerSecond;
   Kind& known = kinds_[kind];

@@ -15,7 +15,6 @@ namespace {
 using platform::LocalSocket;
 
 constexpr int kPatienceMs = 20;
-constexpr std::uint8_t kPeerToPeer = 2;
 
 struct Question {
   std::string sender;
@@ -79,7 +78,7 @@ TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) 
     answer(*ptp4l, first, ptp::ManagementId::kPortPropertiesNp, ptp::PortPropertiesNp{});
     std::this_thread::sleep_for(std::chrono::milliseconds{kPatienceMs});
     ptp::PortDataSet port;
-    port.delay_mechanism = kPeerToPeer;
+    port.delay_mechanism = ptp::kPeerToPeerMechanism;
     // Anybody can write to a socket: what was not asked is no answer.
     answer(*ptp4l, {second.sender, 999}, ptp::ManagementId::kPortDataSet, ptp::PortDataSet{});
     answer(*ptp4l, second, ptp::ManagementId::kPortDataSet, port);
@@ -88,7 +87,7 @@ TEST(ManagementClient, an_answer_that_comes_late_is_not_taken_for_the_next_one) 
       client->ask_and_wait<ptp::PortDataSet>(ptp::ManagementId::kPortDataSet, 50 * kPatienceMs);
   late.join();
   ASSERT_TRUE(port.has_value());
-  EXPECT_EQ(port->delay_mechanism, kPeerToPeer);
+  EXPECT_EQ(port->delay_mechanism, ptp::kPeerToPeerMechanism);
   std::filesystem::remove_all(folder);
 }
 

@@ -19,7 +19,6 @@ constexpr int kAnswersAtOnce = 16;
 // For an answer of ptp4l before anything runs, and once its reports come.
 constexpr int kPatienceMs = 500;
 constexpr Duration kAnswerPatience{std::chrono::seconds{2}};
-constexpr std::uint8_t kPeerToPeer = 2;  // portDS.delayMechanism
 
 PortAddress ptp4l_address(const PtpOptions& options) {
   return {options.monitor.management, options.protocol.domain, options.protocol.major_sdo_id};
@@ -265,7 +264,7 @@ bool complete_by_ptp4l(PtpOptions& options, Log& log) {
           options.monitor.management);
     }
   }
-  if (port && port->delay_mechanism == kPeerToPeer) {
+  if (port && port->delay_mechanism == ptp::kPeerToPeerMechanism) {
     options.protocol.delay_mechanism = ptp::DelayMechanism::kPeerToPeer;
   }
   if (!options.interface.empty()) return !stop.is_set();

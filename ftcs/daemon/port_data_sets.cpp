@@ -9,7 +9,6 @@ namespace {
 constexpr std::uint8_t kTwoStep = 1;          // defaultDS flags
 constexpr std::uint8_t kReceiverOnly = 2;     // the same
 constexpr std::uint8_t kReceiverClass = 255;  // 7.6.2.5: never a grandmaster
-constexpr std::uint8_t kPeerToPeer = 2;       // portDS.delayMechanism
 constexpr std::uint16_t kTimeFlags =
     0x3F;  // what of an Announce's flags belongs to timePropertiesDS
 
@@ -55,7 +54,7 @@ ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::
   port.port.log_sync_interval = options.transmitter.log_sync_interval;
   port.port.log_min_delay_req_interval = options.protocol.log_min_delay_req_interval;
   port.port.log_min_pdelay_req_interval = options.protocol.peer_delay.log_min_interval;
-  if (options.protocol.peer_to_peer()) port.port.delay_mechanism = kPeerToPeer;
+  if (options.protocol.peer_to_peer()) port.port.delay_mechanism = ptp::kPeerToPeerMechanism;
   port.port.version =
       static_cast<std::uint8_t>(options.protocol.minor_version << 4 | ptp::kVersion);
   port.properties = {facts.identity, state, static_cast<std::uint8_t>(facts.hardware_stamps),
@@ -65,7 +64,7 @@ ptp::ManagedPort common(const PtpOptions& options, const PortFacts& facts, ptp::
 }
 
 void set_peer_delay(const ptp::PeerDelay& peer_delay, ptp::ManagedPort& port) {
-  if (port.port.delay_mechanism != kPeerToPeer) return;
+  if (port.port.delay_mechanism != ptp::kPeerToPeerMechanism) return;
   port.port.mean_link_delay = peer_delay.mean_link_delay().value_or(Duration{});
   port.port_np.as_capable = peer_delay.capable() ? 1 : 0;
 }

@@ -6,13 +6,9 @@
 #include <cstring>
 #include <utility>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::daemon {
-namespace {
-
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-
-}  // namespace
-
 RateLimits steering_limits(const platform::ClockDevice& device, const RateLimits& chosen) {
   constexpr double kUsualPpb = 500e3;
   constexpr RateLimits kNone{};

@@ -5,12 +5,11 @@
 #include <utility>
 
 #include "ftcs/ptp/wire/message.h"
+#include "ftcs/time/duration.h"
 #include "ftcs/time/relabel.h"
 
 namespace ftcs::daemon {
 namespace {
-
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// How far the steered clock may be from the reference, at one standard deviation: the servo's own
 /// word, or what the perceived offsets scatter since lock.

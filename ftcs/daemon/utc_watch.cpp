@@ -6,10 +6,10 @@
 #include <ctime>
 #include <utility>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::daemon {
 namespace {
-
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 node::UtcRules rules(const UtcConfig& config) {
   node::UtcRules rules{config.utc_offset, config.epoch};

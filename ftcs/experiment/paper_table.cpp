@@ -11,9 +11,6 @@
 namespace ftcs::experiment {
 namespace {
 
-constexpr Range kPositive{1e-9, 1e18};
-constexpr Range kNotNegative{0.0, 1e18};
-constexpr Range kAny{-1e18, 1e18};
 constexpr Range kFraction{-0.999, 0.999};
 
 Nanoseconds whole(Duration duration) { return Nanoseconds{duration.rounded_ns()}; }
@@ -95,7 +92,7 @@ PaperRow read_row(TomlTable table, const sim::OneWaySpec& world) {
   return row;
 }
 
-const std::vector<std::pair<std::string, CheckFigure>>& figure_names() {
+const std::vector<std::pair<std::string, CheckFigure>>& check_figures() {
   static const std::vector<std::pair<std::string, CheckFigure>> names = {
       {"rms", CheckFigure::kRms},
       {"median", CheckFigure::kMedian},
@@ -114,10 +111,10 @@ const std::vector<std::pair<std::string, CheckFigure>>& figure_names() {
 
 CheckFigure read_figure(TomlTable& table) {
   std::vector<std::string> words;
-  for (const auto& [name, figure] : figure_names()) words.push_back(name);
+  for (const auto& [name, figure] : check_figures()) words.push_back(name);
   const auto word = table.word("figure", words);
   if (!word) table.fail_here("a check needs a figure");
-  const auto found = std::find_if(figure_names().begin(), figure_names().end(),
+  const auto found = std::find_if(check_figures().begin(), check_figures().end(),
                                   [&](const auto& entry) { return entry.first == *word; });
   return found->second;
 }

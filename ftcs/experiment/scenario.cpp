@@ -15,9 +15,6 @@
 namespace ftcs::experiment {
 namespace {
 
-constexpr Range kPositive{1e-9, 1e18};
-constexpr Range kAny{-1e18, 1e18};
-
 /// Cells of an oscillator's frequency in one interval, unless [clock] says otherwise.
 constexpr double kCellsPerInterval = 8.0;
 

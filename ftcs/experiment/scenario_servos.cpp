@@ -12,7 +12,6 @@
 namespace ftcs::experiment {
 namespace {
 
-constexpr Range kNotNegative{0.0, 1e18};
 constexpr Range kGain{0.0, 10.0};
 
 /// linuxptp's turn-around is measured on the steered clock, and no delay is refused.

@@ -10,9 +10,6 @@
 namespace ftcs::experiment {
 namespace {
 
-constexpr Range kPositive{1e-9, 1e18};
-constexpr Range kNotNegative{0.0, 1e18};
-constexpr Range kAny{-1e18, 1e18};
 constexpr Range kFrequency{-0.5, 0.5};
 constexpr Range kAmount{0.0, 0.5};
 constexpr Range kProbability{0.0, 1.0};

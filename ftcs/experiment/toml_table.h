@@ -21,6 +21,9 @@ struct Range {
   double least;
   double most;
 };
+inline constexpr Range kPositive{1e-9, 1e18};
+inline constexpr Range kNotNegative{0.0, 1e18};
+inline constexpr Range kAny{-1e18, 1e18};
 
 /// A table of a TOML file that is read key by key. Every complaint names file, line and column;
 /// finish() complains about keys that nobody asked for and names the nearest one that somebody did.

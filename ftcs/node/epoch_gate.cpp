@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/node/epoch_gate.h"
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::node {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 /// So long after it was built a program may still be the one that sets a clock for the first time.
 constexpr std::int64_t kLongestUseS = 20LL * 365 * 86'400;
 /// More than the rates of two crystals, or of a kernel's clock and its reference, differ by.

@@ -5,10 +5,11 @@
 #include <cstdlib>
 #include <utility>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::node {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kSecondsPerDay = 86'400;
 /// A leap that has not come so long after its time does not come any more.
 constexpr std::int64_t kPatienceS = 10;

@@ -12,11 +12,11 @@
 #include <utility>
 
 #include "ftcs/platform/network_interface.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs::platform {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr double kScaledPerPpm = 65536.0;  // timex.freq counts in 2^-16 ppm
 // Of timex.tick: microseconds per 1/100 s (USER_HZ) on every architecture that has PTP hardware.
 constexpr long kNominalTick = 10'000;

@@ -13,6 +13,8 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::platform {
 
 namespace {
@@ -22,7 +24,6 @@ constexpr int kPacketIgnoreOutgoing = 23;
 constexpr std::size_t kControlSize = 512;
 
 std::int64_t to_ns(const timespec& time) noexcept {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   return static_cast<std::int64_t>(time.tv_sec) * kNsPerSecond + time.tv_nsec;
 }
 

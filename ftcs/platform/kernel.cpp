@@ -13,10 +13,10 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::platform {
 namespace {
-
-constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 template <class Number>
 Number or_errno(Number result) noexcept {
@@ -24,7 +24,7 @@ Number or_errno(Number result) noexcept {
 }
 
 timespec to_timespec(std::int64_t ns) noexcept {
-  return {.tv_sec = ns / kNanosecondsPerSecond, .tv_nsec = ns % kNanosecondsPerSecond};
+  return {.tv_sec = ns / kNsPerSecond, .tv_nsec = ns % kNsPerSecond};
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ timespec to_timespec(std::int64_t ns) noexcept {
 std::int64_t LinuxKernel::clock_ns(clockid_t clock) noexcept {
   timespec time{};
   if (::clock_gettime(clock, &time) != 0) return 0;
-  return std::int64_t{time.tv_sec} * kNanosecondsPerSecond + time.tv_nsec;
+  return std::int64_t{time.tv_sec} * kNsPerSecond + time.tv_nsec;
 }
 
 int LinuxKernel::socket(int domain, int type) noexcept {

@@ -16,10 +16,11 @@
 #include <unistd.h>
 #include <utility>
 
+#include "ftcs/time/duration.h"
+
 namespace ftcs::platform {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr int kFinestPrecision = -30;
 
 /// As chrony's programs expect it in memory, in this machine's byte order.

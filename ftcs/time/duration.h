@@ -10,6 +10,7 @@ namespace ftcs {
 
 /// Whole nanoseconds, the unit of configuration values.
 using Nanoseconds = std::chrono::nanoseconds;
+inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// A signed length of time: whole nanoseconds and a fraction in units of 2^-32 ns.
 ///

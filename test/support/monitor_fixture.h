@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "ftcs/time/duration.h"
+
 /// For tests: a ptp4l that reports one Sync or Delay_Req a datagram, made octet by octet.
 namespace ftcs::ptp::fake {
-
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 inline void append(std::vector<std::uint8_t>& bytes, std::uint64_t value, int octets) {
   for (int i = octets; i-- > 0;) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));

@@ -10,14 +10,13 @@
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/daemon/watch/follower_watch.h"
 #include "ftcs/platform/stop_flag.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs::daemon {
 namespace {
 
 using platform::ClockAccess;
 using platform::ClockDevice;
-
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 node::ClockFollowerConfig follower_config(const PhcOptions& options) {
   node::ClockFollowerConfig follower;

@@ -139,6 +139,9 @@ struct TimePropertiesDataSet {
   friend constexpr bool operator==(const TimePropertiesDataSet&,
                                    const TimePropertiesDataSet&) noexcept = default;
 };
+/// portDS.delayMechanism, 8.2.15.4.4.
+inline constexpr std::uint8_t kEndToEndMechanism = 1;
+inline constexpr std::uint8_t kPeerToPeerMechanism = 2;
 /// portDS, 15.5.3.7.1. Intervals are log2 of seconds.
 struct PortDataSet {
   PortIdentity port{};
@@ -148,7 +151,7 @@ struct PortDataSet {
   std::int8_t log_announce_interval = 1;
   std::uint8_t announce_receipt_timeout = 3;
   std::int8_t log_sync_interval = 0;
-  std::uint8_t delay_mechanism = 1;  ///< 1 end-to-end, 2 peer-to-peer
+  std::uint8_t delay_mechanism = kEndToEndMechanism;
   std::int8_t log_min_pdelay_req_interval = 0;
   std::uint8_t version = kVersion;  ///< upper four bits: minor version (of 1588-2019)
   friend constexpr bool operator==(const PortDataSet&, const PortDataSet&) noexcept = default;
