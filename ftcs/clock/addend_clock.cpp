@@ -6,11 +6,10 @@
 
 #include "ftcs/clock/command_check.h"
 #include "ftcs/clock/wide.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs {
 namespace {
-
-constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 // Quotient rounded towards minus infinity; divisor > 0.
 [[nodiscard]] constexpr Int128 floor_divide(Int128 dividend, Int128 divisor) noexcept {
@@ -39,7 +38,7 @@ constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 double AddendClockConfig::nominal_addend() const noexcept {
   const double ns_per_tick =
-      static_cast<double>(kNanosecondsPerSecond) / static_cast<double>(nominal_frequency_hz);
+      static_cast<double>(kNsPerSecond) / static_cast<double>(nominal_frequency_hz);
   return capacity(*this) * (ns_per_tick / increment.ns());
 }
 
@@ -97,7 +96,7 @@ std::int64_t AddendClock::ticks_at(FreeRunningTime instant) const noexcept {
   const Duration elapsed = instant - config_.free_running;
   const auto frequency = static_cast<Int128>(config_.nominal_frequency_hz);
   const Int128 scaled = elapsed.floor_ns() * frequency + ((elapsed.fraction() * frequency) >> 32);
-  return static_cast<std::int64_t>(floor_divide(scaled, kNanosecondsPerSecond));
+  return static_cast<std::int64_t>(floor_divide(scaled, kNsPerSecond));
 }
 
 std::uint64_t AddendClock::addend_for(Rate rate) const noexcept {

@@ -135,20 +135,15 @@ const diagnosis::Talker* another(const diagnosis::Talkers& heard, const PtpOptio
   });
 }
 
-/// Two transmitters, followed one after the other.
-struct Comparison {
-  diagnosis::Finding finding;
-  bool decisive = false;  ///< they disagree by more than what is known of each
-};
-
-/// `first` is locked to `one`; `second` listened to `other` alone.
-Comparison compared(const ptp::PortIdentity& one, const TimeBound& first,
-                    const diagnosis::Talker& other, const TimeBound& second) {
+/// Two transmitters, followed one after the other: `first` is locked to `one`; `second` listened
+/// to `other` alone. In doubt, where they disagree by more than what is known of each.
+diagnosis::Finding compared(const ptp::PortIdentity& one, const TimeBound& first,
+                            const diagnosis::Talker& other, const TimeBound& second) {
   if (second.state != TimeBound::State::kLocked) {
-    return {{diagnosis::Cause::kTwoTransmitters,
-             fmt::format("the time of {} (domain {}) was not compared: no lock to it in as long",
-                         to_text(other.port).view(), other.domain),
-             "one time from both", "a longer --duration"}};
+    return {diagnosis::Cause::kTwoTransmitters,
+            fmt::format("the time of {} (domain {}) was not compared: no lock to it in as long",
+                        to_text(other.port).view(), other.domain),
+            "one time from both", "a longer --duration"};
   }
   const double apart_us = std::abs((first.time_at(second.at) - second.time).ns()) * 1e-3;
   const double known_us = (first.half_width_ns(second.at) + second.bound_ns) * 1e-3;
@@ -157,12 +152,11 @@ Comparison compared(const ptp::PortIdentity& one, const TimeBound& first,
       "the transmitters {} and {} (domain {}) {} {:.3f} us, {:.3f} us of which may be noise",
       to_text(one).view(), to_text(other.port).view(), other.domain,
       disagree ? "disagree by" : "agree: they differ by", apart_us, known_us);
-  if (!disagree) return {{diagnosis::Cause::kTwoTransmitters, std::move(seen), "", ""}};
-  return {{diagnosis::Cause::kTransmittersDisagree, std::move(seen), "one time from both",
-           "one of them is wrong, or the path to one is asymmetric by twice as much: a third one "
-           "would tell; --delayAsymmetry takes a known asymmetry off, --acceptable-transmitter "
-           "chooses",
-           true},
+  if (!disagree) return {diagnosis::Cause::kTwoTransmitters, std::move(seen), "", ""};
+  return {diagnosis::Cause::kTransmittersDisagree, std::move(seen), "one time from both",
+          "one of them is wrong, or the path to one is asymmetric by twice as much: a third one "
+          "would tell; --delayAsymmetry takes a known asymmetry off, --acceptable-transmitter "
+          "chooses",
           true};
 }
 
@@ -186,10 +180,11 @@ namespace {
 constexpr std::uint16_t kPortOfItsOwn = 0x7FFF;
 
 /// A second one is followed for as long, by a port of its own, and its time compared.
-std::optional<Comparison> compare_with_another(platform::Kernel& kernel, const PtpOptions& options,
-                                               Log& log, const ptp::ClockIdentity& own,
-                                               PtpReceiver& first,
-                                               const diagnosis::Talkers& heard) {
+std::optional<diagnosis::Finding> compare_with_another(platform::Kernel& kernel,
+                                                       const PtpOptions& options, Log& log,
+                                                       const ptp::ClockIdentity& own,
+                                                       PtpReceiver& first,
+                                                       const diagnosis::Talkers& heard) {
   const auto followed = first.transmitter();
   if (!followed || first.time().state != TimeBound::State::kLocked) return std::nullopt;
   const diagnosis::Talker* const other = another(heard, options, *followed);
@@ -312,18 +307,15 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   const diagnosis::Talkers& talkers = seen.on_wire ? *seen.on_wire : seen.at_port;
   result.heard.assign(talkers.all().begin(), talkers.all().end());
   if (port.failure() && seen.link_up) result.findings.push_back(failure(*port.failure()));
-  auto comparison = compare_with_another(kernel, options, log, identity->clock, port, talkers);
-  if (comparison && comparison->decisive) {
-    result.findings.push_back(std::move(comparison->finding));
-  }
+  const auto comparison =
+      compare_with_another(kernel, options, log, identity->clock, port, talkers);
+  if (comparison && comparison->in_doubt) result.findings.push_back(*comparison);
   for (diagnosis::Finding& finding : diagnosis::diagnose_all(seen)) {
     // Beside a doubt it is no answer that the clock would lock.
     const bool locked = finding.cause == diagnosis::Cause::kLocked;
     if (!locked || result.findings.empty()) result.findings.push_back(std::move(finding));
   }
-  if (comparison && !comparison->decisive) {
-    result.findings.push_back(std::move(comparison->finding));
-  }
+  if (comparison && !comparison->in_doubt) result.findings.push_back(*comparison);
   return result;
 }
 

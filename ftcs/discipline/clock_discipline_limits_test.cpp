@@ -116,12 +116,7 @@ TEST_F(ClockDisciplineTest, no_offset_beyond_the_bound_is_followed_at_any_time) 
 TEST_F(ClockDisciplineTest, another_timescale_is_a_beginning_and_another_transmitter_is_none) {
   for (const bool may_step : {false, true}) {
     for (const bool timescale : {false, true}) {
-      DisciplineConfig config = config_for(ServoKind::kFtcs);
-      config.largest_offset = 1s;
-      config.step.mode = may_step ? StepMode::kFirst : StepMode::kNever;
-      reference_jump_ = Duration{};
-      start(Nanoseconds{10us}, config);
-      for (int n = 0; n < 8; ++n) sync_and_wait();
+      lock_within_a_second(may_step);
       const std::uint64_t steps = discipline_->counters().steps;
       if (timescale) {
         discipline_->on_new_timescale();

@@ -161,12 +161,7 @@ TEST_F(ClockDisciplineTest, a_path_delay_that_is_given_to_the_servo_itself_is_kn
 
 TEST_F(ClockDisciplineTest, a_jump_of_the_reference_beyond_the_bound_is_a_beginning) {
   for (const bool may_step : {false, true}) {
-    DisciplineConfig config = config_for(ServoKind::kFtcs);
-    config.largest_offset = 1s;
-    config.step.mode = may_step ? StepMode::kFirst : StepMode::kNever;
-    reference_jump_ = Duration{};
-    start(Nanoseconds{10us}, config);
-    for (int n = 0; n < 8; ++n) sync_and_wait();
+    lock_within_a_second(may_step);
     reference_jump_ = Nanoseconds{2s};
     const JumpPlan plan = discipline_->on_reference_jump(reference_jump_);
     sync_and_wait();

@@ -9,12 +9,12 @@
 
 #include "ftcs/platform/clock_device.h"
 #include "ftcs/platform/cross_timestamp.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs::daemon {
 
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 /// Between two questions to a clock that costs a system call.
 constexpr Duration kPause{Nanoseconds{125'000'000}};
 /// Quickest of so many readings.
@@ -128,7 +128,7 @@ Opened PlantClock::open(const std::string& source, platform::Kernel& kernel) {
   if (source == "tai") {
     const std::int64_t ahead =
         ahead_of_monotonic_ns(kernel, CLOCK_TAI) - ahead_of_monotonic_ns(kernel, CLOCK_REALTIME);
-    if (ahead > kSecondNs) return PlantClock(kernel, "CLOCK_TAI", CLOCK_TAI);
+    if (ahead > kNsPerSecond) return PlantClock(kernel, "CLOCK_TAI", CLOCK_TAI);
     return fmt::format(
         "CLOCK_TAI is not set: it shows UTC, as the kernel knows no offset. A PTP or NTP program "
         "that sets it is needed, or --plant-time realtime where UTC is what is wanted");

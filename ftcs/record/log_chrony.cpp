@@ -10,11 +10,10 @@
 
 #include "ftcs/record/fields.h"
 #include "ftcs/record/log_formats.h"
+#include "ftcs/time/duration.h"
 
 namespace ftcs {
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 template <std::size_t N>
 std::optional<std::array<int, N>> parse_numbers(std::string_view text, char separator) {
@@ -34,7 +33,8 @@ std::optional<Duration> parse_date(std::string_view date, std::string_view time)
   const auto point = std::min(time.find('.'), time.size());
   const auto ymd = parse_numbers<3>(date, '-');
   const auto hms = parse_numbers<3>(time.substr(0, point), ':');
-  const auto fraction = point == time.size() ? Duration{} : parse_time(time.substr(point), kSecond);
+  const auto fraction =
+      point == time.size() ? Duration{} : parse_time(time.substr(point), kNsPerSecond);
   if (!ymd || !hms || !fraction) return std::nullopt;
   const std::chrono::year_month_day day{std::chrono::year{(*ymd)[0]},
                                         std::chrono::month{static_cast<unsigned>((*ymd)[1])},
@@ -43,7 +43,7 @@ std::optional<Duration> parse_date(std::string_view date, std::string_view time)
   const std::int64_t days = std::chrono::sys_days{day}.time_since_epoch().count();
   const std::int64_t seconds =
       days * 86'400 + (*hms)[0] * std::int64_t{3600} + (*hms)[1] * std::int64_t{60} + (*hms)[2];
-  return Duration::from_whole_ns(seconds * kSecond) + *fraction;
+  return Duration::from_whole_ns(seconds * kNsPerSecond) + *fraction;
 }
 
 enum class Kind : std::uint8_t { kTracking, kMeasurements, kStatistics, kRefclocks };

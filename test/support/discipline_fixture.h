@@ -55,6 +55,16 @@ class ClockDisciplineTest : public ::testing::Test {
     return telemetry;
   }
 
+  /// Locked from 10 us, by FTCS, which believes offsets up to a second.
+  void lock_within_a_second(bool may_step) {
+    DisciplineConfig config = config_for(ServoKind::kFtcs);
+    config.largest_offset = 1s;
+    config.step.mode = may_step ? StepMode::kFirst : StepMode::kNever;
+    reference_jump_ = Duration{};
+    start(Nanoseconds{10us}, config);
+    for (int n = 0; n < 8; ++n) sync_and_wait();
+  }
+
   ManualSource oscillator_;
   Rate reference_rate_{};
   Duration reference_jump_{};

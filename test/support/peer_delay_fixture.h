@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/ptp/peer_delay.h"
+#include "test/support/actions.h"
 
 namespace ftcs::ptp::peer_delay_test {
 
@@ -20,15 +21,6 @@ inline constexpr Nanoseconds kTurnAround = 10ms;
 inline FreeRunningTime ours(Nanoseconds time) { return FreeRunningTime{Duration{time + 77s}}; }
 inline ReferenceTime neighbours(Nanoseconds time) {
   return ReferenceTime{scale(Duration{time}, Rate::from_ppm(100.0)) + Duration{1'800'000'000s}};
-}
-
-template <class T>
-std::vector<T> of(const ActionList& actions) {
-  std::vector<T> found;
-  for (const Action& action : actions) {
-    if (const T* one = std::get_if<T>(&action)) found.push_back(*one);
-  }
-  return found;
 }
 
 /// The world: our port and its neighbour, 700 ns of cable apart. The neighbour's clock began at

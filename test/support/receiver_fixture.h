@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "ftcs/ptp/time_receiver.h"
+#include "test/support/actions.h"
 
 /// The world of the receiver's tests: a receiver on its free-running clock, which shows true time
 /// plus 5 s, and messages that a test hands to it by its own hand: well-formed unless the test
@@ -23,15 +24,6 @@ inline constexpr Nanoseconds kDelay = 10us;
 
 inline FreeRunningTime local(Nanoseconds time) { return FreeRunningTime{Duration{time + 5s}}; }
 inline ReferenceTime reference(Nanoseconds time) { return ReferenceTime{Duration{time + kEpoch}}; }
-
-template <class T>
-std::vector<T> of(const ActionList& actions) {
-  std::vector<T> found;
-  for (const Action& action : actions) {
-    if (const T* one = std::get_if<T>(&action)) found.push_back(*one);
-  }
-  return found;
-}
 
 inline MessageBytes bytes_of(const Message& message) {
   const auto bytes = encode(message);

@@ -42,21 +42,16 @@ def until_locked(ftcs, folder):
 
 
 def client(number):
-    """Half of a request and silence; an event stream that nobody reads; nothing at all. None: it was not let in."""
-    try:
-        connection = socket.create_connection(("::1", PORT + 2), timeout=3)
-        connection.sendall((b"GET /sta", b"GET /events HTTP/1.1\r\nHost: [::1]\r\n\r\n", b"")[number % 3])
-        return connection
-    except OSError:
-        return None
+    """Half of a request and silence; an event stream that nobody reads; nothing at all."""
+    connection = socket.create_connection(("::1", PORT + 2), timeout=30)
+    connection.sendall((b"GET /sta", b"GET /events HTTP/1.1\r\nHost: [::1]\r\n\r\n", b"")[number % 3])
+    return connection
 
 
 def crowd():
     """All at the same time: who waits for the door does not keep the next one from it."""
     with concurrent.futures.ThreadPoolExecutor(CLIENTS) as pool:
-        clients = [connection for connection in pool.map(client, range(CLIENTS)) if connection]
-    assert len(clients) >= CLIENTS // 5, f"only {len(clients)} of {CLIENTS} clients were let in"
-    return clients
+        return list(pool.map(client, range(CLIENTS)))
 
 
 def examine(ftcs, folder, receiver):
@@ -79,7 +74,7 @@ def examine(ftcs, folder, receiver):
     for connection in clients:
         connection.close()
     _, seconds = get(page, 30)
-    print(f"{len(clients)} of {CLIENTS} clients let in: locked, metrics within {slowest * 1e3:.0f} ms, {more} threads and {grown} kB more; page after {seconds:.1f} s")
+    print(f"{CLIENTS} clients: locked, metrics within {slowest * 1e3:.0f} ms, {more} threads and {grown} kB more; page after {seconds:.1f} s")
 
 
 def main():
