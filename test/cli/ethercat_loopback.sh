@@ -7,7 +7,7 @@ set -uo pipefail
 # shellcheck source=test/cli/common.sh
 source "$(dirname "$0")/common.sh"
 
-port=$((30000 + $$ % 5000))
+port=$((20000 + 4 * ($$ % 3000)))
 to=(--udp "127.0.0.1:$port")
 
 "$ftcs" ethercat scan "${to[@]}" > "$folder/nobody" 2>&1

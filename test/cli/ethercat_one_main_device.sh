@@ -5,7 +5,7 @@
 set -uo pipefail
 ftcs=$(realpath "${1:-build/ftcs}")
 folder=$(mktemp -d)
-port=$((36000 + $$ % 1000))
+port=$((20000 + $$ % 12000))
 "$ftcs" ethercat-segment --udp "$port" --drives 2 > "$folder/segment.log" 2>&1 &
 segment=$!
 main=

@@ -16,7 +16,7 @@ cleanup() {
 trap cleanup EXIT
 strace -o "$folder/probe" true 2> /dev/null || { echo "skipped: may not trace here"; exit 77; }
 
-port=$((35000 + $$ % 5000))
+port=$((20000 + $$ % 12000))
 "$ftcs" ethercat-segment --udp "$port" --drives 2 > "$folder/segment" 2>&1 &
 segment=$!
 sleep 0.5

@@ -7,7 +7,7 @@ set -uo pipefail
 # shellcheck source=test/cli/common.sh
 . "$(dirname "$0")/common.sh"
 here=$(dirname "$(realpath "$0")")
-port=$((37000 + $$ % 1000))
+port=$((20000 + $$ % 12000))
 number=0
 
 segment() {  # its flags ...

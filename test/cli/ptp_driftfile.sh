@@ -7,7 +7,7 @@ set -uo pipefail
 # shellcheck source=test/cli/common.sh
 source "$(dirname "$0")/common.sh"
 
-port=$((30000 + 2 * ($$ % 1000)))
+port=$((20000 + 2 * ($$ % 6000)))
 ptp() { exec "$ftcs" ptp -i lo --event-port $port --general-port $((port + 1)) "$@"; }
 receive() {  # name of the log, driftfile, further flags
   local log=$folder/$1.log drift=$2

@@ -138,7 +138,7 @@ done
 kill "$holder"
 
 # A port that another program holds: a unicast port belongs to one.
-ports=(--event-port $((20000 + $$ % 10000)) --general-port $((30000 + $$ % 10000)))
+ports=(--event-port $((20000 + $$ % 6000)) --general-port $((26000 + $$ % 6000)))
 "$ftcs" ptp -i lo "${ports[@]}" --unicast 127.0.0.1 > /dev/null 2>&1 &
 holder=$!
 sleep 0.5

@@ -8,7 +8,7 @@ set -uo pipefail
 source "$(dirname "$0")/common.sh"
 
 # Always in the background: the process becomes the program, so that its pid takes the signals.
-port=$((20000 + 2 * ($$ % 5000)))
+port=$((20000 + 2 * ($$ % 6000)))
 ptp() { exec "$ftcs" ptp -i lo --event-port $port --general-port $((port + 1)) "$@"; }
 
 ptp --role time-transmitter --logSyncInterval -4 --logAnnounceInterval -2 --logMinDelayReqInterval -4 \

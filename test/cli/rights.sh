@@ -7,7 +7,7 @@ set -uo pipefail
 # shellcheck source=test/cli/common.sh
 source "$(dirname "$0")/common.sh"
 table=$(dirname "$0")/../../docs/security.md
-port=$((40000 + 4 * ($$ % 2000)))
+port=$((20000 + 4 * ($$ % 3000)))
 
 declare -A bit=([CHOWN]=0 [DAC_OVERRIDE]=1 [NET_BIND_SERVICE]=10 [NET_ADMIN]=12 [NET_RAW]=13 [IPC_LOCK]=14 [SYS_NICE]=23 [SYS_TIME]=25)
 

@@ -25,7 +25,7 @@ ready_after_lock() {  # NAME
     fail "$1: ready, but not locked"
 }
 
-port=$((31000 + $$ % 4000))
+port=$((20000 + $$ % 4000))
 "$ftcs" ethercat-segment --udp "$port" --drives 2 --priority 70 > "$folder/segment" 2>&1 &
 pids+=($!)
 listen ethercat

@@ -10,7 +10,7 @@ source "$(dirname "$0")/common.sh"
 
 # Always in the background: the process becomes the program, so that its pid takes the signals. Each receiver
 # has a transmitter of its own: a link has two ends.
-first=$((20000 + 4 * ($$ % 5000)))
+first=$((20000 + 4 * ($$ % 3000)))
 ptp() {
   local port=$1
   shift

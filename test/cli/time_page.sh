@@ -7,7 +7,7 @@ set -uo pipefail
 # shellcheck source=test/cli/common.sh
 source "$(dirname "$0")/common.sh"
 root=$(realpath "$(dirname "$0")/../..")
-port=$((36000 + 2 * ($$ % 1000)))
+port=$((20000 + 2 * ($$ % 6000)))
 udp=(-i lo --event-port $port --general-port $((port + 1)) --uds_address none)
 
 cat > "$folder/ask.c" << 'EOT'

@@ -17,7 +17,7 @@ import time
 import urllib.request
 
 GATE = ["--gate", "2ms"]
-PORT = 24000 + os.getpid() % 900 * 20
+PORT = 20000 + os.getpid() % 600 * 20
 CYCLE = ["--cycle", "4ms", "--sync-interval", "200ms", "--drift-pulses", "500", "--priority", "0", "--lost-frame-limit",
          "1000"]
 # name, the segment's flags (None: there is none), flags of the run, cause, a part of the remedy

@@ -12,7 +12,7 @@ import tempfile
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from ethercat import Manager, agree, without_figures  # noqa: E402
 
-PORT = 33000 + os.getpid() % 900 * 15
+PORT = 20000 + os.getpid() % 800 * 15
 # flags of a transmitter on the same ports (None: there is none), flags of the receiver, cause
 CASES = [
     (None, [], "no_announce"),
@@ -37,12 +37,17 @@ def examine(ftcs, number, case):
                                           env={**os.environ, "NOTIFY_SOCKET": manager.path}))
         wrong = agree(ftcs, folder, manager, web, cause)
         sentence = manager.status()
+        ended = processes[-1].poll()
         for process in reversed(processes):
             process.send_signal(signal.SIGINT)
             process.wait()
         log.seek(0)
-        said = without_figures(log.read())
-    if not wrong and without_figures(sentence) not in said:
+        said = log.read()
+    if ended is not None:
+        wrong = f"ended with {ended}: {said}"
+    elif wrong:
+        wrong += f"; its log: {said}"
+    elif without_figures(sentence) not in without_figures(said):
         wrong = f"the log has no word of it: {said}"
     return wrong, cause, sentence
 

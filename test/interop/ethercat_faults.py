@@ -171,7 +171,7 @@ def main():
                                   ["--ride-through", "5"], False, fault_6_7),
         "reference 100 ppm faster": (["--fault", f"skew:0@{FAULT_AT_S}=100"], [], False, {}),
     }
-    port = 30000 + os.getpid() % 5000
+    port = 20000 + os.getpid() % 12000
     for number, (name, (segment_flags, run_flags, stalls, expected)) in enumerate(cases.items()):
         for offset, servo in enumerate(("ftcs", "adaptive")):
             with tempfile.TemporaryDirectory() as folder:

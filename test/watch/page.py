@@ -18,7 +18,7 @@ import urllib.request
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import Browser, available  # noqa: E402
 
-PORT = 20000 + os.getpid() % 4000 * 8
+PORT = 20000 + os.getpid() % 1300 * 9
 processes = []
 
 
