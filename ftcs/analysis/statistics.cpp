@@ -110,7 +110,7 @@ Histogram histogram(std::span<const double> values, double lower, double upper, 
   result.lower = lower;
   result.upper = upper;
   result.counts.assign(bins, 0);
-  const double per_unit = static_cast<double>(bins) / (upper - lower);
+  const double width = upper - lower;  // perhaps so small that bins / width would overflow
   for (const double value : values) {
     if (!std::isfinite(value)) continue;
     if (value < lower) {
@@ -119,7 +119,8 @@ Histogram histogram(std::span<const double> values, double lower, double upper, 
       ++result.above;
     } else {
       // The last bin is closed on the right, so that the maximum belongs to it.
-      const auto bin = static_cast<std::size_t>((value - lower) * per_unit);
+      const auto bin =
+          static_cast<std::size_t>((value - lower) / width * static_cast<double>(bins));
       ++result.counts[std::min(bin, bins - 1)];
     }
   }

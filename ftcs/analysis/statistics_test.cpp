@@ -120,6 +120,13 @@ TEST(Histogram, chooses_a_range_that_holds_everything) {
   EXPECT_LE(bins.counts.size(), 200U);
 }
 
+TEST(Histogram, of_values_a_denormal_apart_is_defined) {
+  constexpr double kSmall = 3e-321;  // its reciprocal is not a double
+  const double values[] = {0.0, kSmall / 2, kSmall};
+  const Histogram bins = histogram(values, 0.0, kSmall, 2);
+  EXPECT_EQ(bins.counts, (std::vector<std::uint64_t>{1, 2}));
+}
+
 TEST(Histogram, of_a_constant_or_of_nothing_is_defined) {
   const double constant[] = {5.0, 5.0};
   EXPECT_EQ(histogram(constant).counts, std::vector<std::uint64_t>{2});

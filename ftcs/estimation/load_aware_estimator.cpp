@@ -69,14 +69,26 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
+/// What the first picture takes for noise, or does not know of the offset.
+template <class Grid>
+double LoadAwareEstimator<Grid>::plain_doubt_ns() const noexcept {
+  return std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
+}
+
+/// The first picture is sharp, and far from the floor.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::contradicts() const noexcept {
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  return plain_doubt_ns() < kFarApart * apart;
+}
+
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
-  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
-  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  const bool contradicts = noise < kFarApart * apart;
+  const double noise = plain_doubt_ns();
+  const bool contradicts = this->contradicts();
   const bool sharp =
       contradicts || noise < kSharp * floor_.scale() || noise < kShort * floor_.mean_wait();
   const bool sharper = kSharper * noise < floor_.scale();
@@ -155,7 +167,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
-  const bool convinces = believed_ || agreed || lead > kBelieved;
+  // A floor across a step of the clock: the record holds messages from before it.
+  const bool convinces = believed_ || agreed || (lead > kBelieved && !contradicts());
   believed_ = floor_.locked() && lead >= kDisbelieved && convinces;
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
