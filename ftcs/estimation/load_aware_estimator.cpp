@@ -69,17 +69,14 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart < kAgree * floor;
 }
 
-/// What the first picture takes for noise, or does not know of the offset.
+/// The first picture is far from the floor, and knows its offset much better
+/// than the floor knows its own: the record of the floor holds messages from
+/// before a step of the clock.
 template <class Grid>
-double LoadAwareEstimator<Grid>::plain_doubt_ns() const noexcept {
-  return std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
-}
-
-/// The first picture is sharp, and far from the floor.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::contradicts() const noexcept {
+bool LoadAwareEstimator<Grid>::overruled() const noexcept {
+  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  return plain_doubt_ns() < kFarApart * apart;
+  return noise < kFarApart * apart && kSharp * noise < floor_.offset_sigma_ns(0.0);
 }
 
 /// Where messages wait the first picture is never as sharp as the waits are
@@ -87,8 +84,9 @@ bool LoadAwareEstimator<Grid>::contradicts() const noexcept {
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
-  const double noise = plain_doubt_ns();
-  const bool contradicts = this->contradicts();
+  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const bool contradicts = noise < kFarApart * apart;
   const bool sharp =
       contradicts || noise < kSharp * floor_.scale() || noise < kShort * floor_.mean_wait();
   const bool sharper = kSharper * noise < floor_.scale();
@@ -167,9 +165,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
-  // A floor across a step of the clock: the record holds messages from before it.
-  const bool convinces = believed_ || agreed || (lead > kBelieved && !contradicts());
-  believed_ = floor_.locked() && lead >= kDisbelieved && convinces;
+  const bool convinces = believed_ || agreed || lead > kBelieved;
+  believed_ = floor_.locked() && lead >= kDisbelieved && convinces && !overruled();
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
 }

@@ -82,8 +82,7 @@ class LoadAwareEstimator {
  private:
   void forget_floor() noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
-  [[nodiscard]] double plain_doubt_ns() const noexcept;
-  [[nodiscard]] bool contradicts() const noexcept;
+  [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
