@@ -29,8 +29,8 @@ constexpr std::uint32_t kYoung = 100;
 /// the window late now and then, and its milliseconds must not become the noise
 /// at once.
 constexpr double kLargestResidual = 30.0;
-/// The second opinion costs more than everything else: always early, later
-/// every so often.
+/// The second opinion costs more than everything else: always early, and where
+/// what was known has just been forgotten; later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
 constexpr std::uint8_t kOpinionPeriod = 4;
 constexpr std::uint8_t kOpinionWhile = 16;
@@ -254,11 +254,11 @@ void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innova
   second_opinion_.push(seen, innovation);
   if (gate_.most_rejected() >= kSurprises || second_opinion_.serial() >= kSurprises)
     surprise_ = kOpinionWhile;
-  const bool due = count_ <= kOpinionOften || count_ % kOpinionPeriod == 0 || surprise_ > 0;
+  const bool fresh = count_ <= kOpinionOften || evidence_.messages() < kOpinionOften;
+  const bool due = fresh || count_ % kOpinionPeriod == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
-  const bool young =
-      (count_ <= kOpinionOften || evidence_.messages() < kOpinionOften) && second_opinion_.full();
+  const bool young = fresh && second_opinion_.full();
   const bool content = settled() && gate_.most_rejected() == 0;
   const double usual = content ? kSettledContradiction : kContradiction;
   const double contradiction = young ? kYoungContradiction : usual;
