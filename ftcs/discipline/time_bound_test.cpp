@@ -29,10 +29,10 @@ struct Scenario {
   const char* name;
   std::function<double(std::mt19937_64&)> noise;
   double loss = 0.0;
-  double wander = 0.0;   ///< of the rate, per root second
-  int outage_every = 0;  ///< Syncs; each of 60 s
-  int step_every = 0;    ///< Syncs; each of 20 us
-  double load = 0.0;     ///< part of the messages that wait behind another, up to 120 us
+  double wander = 0.0;            ///< of the rate, per root second
+  int outage_every = 0;           ///< Syncs; each of 60 s
+  int step_every = 0;             ///< Syncs; each of 20 us
+  double load = 0.0;              ///< part of the messages that wait behind another, up to 120 us
   std::uint64_t least = 200'000;  ///< questions
 };
 
@@ -154,10 +154,8 @@ INSTANTIATE_TEST_SUITE_P(
         Scenario{
             .name = "outages of 60 s", .noise = gaussian, .wander = 1e-9, .outage_every = 2'000},
         // Seven hundred steps: after one of them a floor was seen that lay across it.
-        Scenario{.name = "steps of 20 us",
-                 .noise = gaussian,
-                 .step_every = 400,
-                 .least = 14'300'000},
+        Scenario{
+            .name = "steps of 20 us", .noise = gaussian, .step_every = 400, .least = 14'300'000},
         Scenario{.name = "40 % wait behind others", .noise = gaussian, .load = 0.4}));
 
 TEST(TimeBound, without_a_deviation_nothing_is_stated) {

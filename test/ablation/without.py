@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""without.py BUILD [NAME]: takes one mechanism of the estimator out after the other (mechanisms.toml: a piece of its source and what stands
+in its place), compiles what that changes beside the build, and runs the test or the scenario that is said to need it. That must fail.
+What ships has no switches for it."""
+import concurrent.futures
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import tomllib
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+# Whose functions are the estimator's own; other objects do not call into its headers.
+PARTS = {"layer/estimation/CMakeFiles/ftcs_estimation.dir/": "estimation", "layer/servo/CMakeFiles/ftcs_servo.dir/adaptive/": "servo"}
+
+
+def output(*command):
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+class Build:
+    """What an existing build knows of its objects."""
+
+    def __init__(self, folder):
+        self.folder = os.path.realpath(folder)
+        self.users = {}  # source or header -> objects
+        for block in output("ninja", "-C", self.folder, "-t", "deps").split("\n\n"):
+            first, *lines = block.split("\n")
+            for line in lines:
+                self.users.setdefault(os.path.realpath(os.path.join(self.folder, line.strip())), []).append(first.split(":")[0])
+        self.last = {}
+
+    def command(self, target):
+        """What makes `target`, the last of the commands that lead to it."""
+        if target not in self.last:
+            self.last[target] = output("ninja", "-C", self.folder, "-t", "commands", "-s", target).strip()
+        return self.last[target]
+
+    def changed(self, file, target):
+        """The objects of the program `target` that depend on `file`: its own, and those of the layers that it is linked to."""
+        linked = shlex.split(self.command(target))
+        layers = [part for part, layer in PARTS.items() if f"layer/{layer}/libftcs_{layer}.a" in linked]
+        return [name for name in self.users.get(os.path.join(ROOT, file), []) if name in linked or name.startswith(tuple(layers))]
+
+    def compile(self, name, overlay):
+        """The object `name` made anew, headers of `overlay` before those of the project."""
+        made = os.path.join(overlay, name.replace("/", "_"))
+        words, kept = shlex.split(self.command(name)), []
+        source = words[words.index("-c") + 1]
+        other = os.path.join(overlay, os.path.relpath(source, ROOT))
+        while words:
+            word = words.pop(0)
+            if word in ("-o", "-MT", "-MF", "-c") or word == "-include":
+                words.pop(0)
+            elif word not in ("-MD", "-Winvalid-pch", "-Werror"):
+                kept.append(word)
+        kept[1:1] = ["-I" + overlay, "-w"]
+        subprocess.run([*kept, "-o", made, "-c", other if os.path.exists(other) else source], check=True, cwd=self.folder)
+        return made
+
+    def link(self, target, objects, overlay):
+        """The program `target` with `objects` in the place of its own and of its libraries'."""
+        made = os.path.join(overlay, "program")
+        words = shlex.split(self.command(target).removeprefix(": && ").removesuffix(" && :"))
+        words[words.index("-o") + 1] = made
+        words = [word for word in words if word not in objects]
+        at = words.index("-o")
+        subprocess.run([*words[:at], *objects.values(), *words[at:]], check=True, cwd=self.folder)
+        return made
+
+
+def taken_out(mechanism, overlay):
+    path = os.path.join(overlay, mechanism["file"])
+    os.makedirs(os.path.dirname(path))
+    with open(os.path.join(ROOT, mechanism["file"]), encoding="utf-8") as file:
+        text = file.read()
+    if text.count(mechanism["with"]) != 1:
+        sys.exit(f"mechanisms.toml: {mechanism['name']}: '{mechanism['with']}' stands {text.count(mechanism['with'])} times in {mechanism['file']}")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text.replace(mechanism["with"], mechanism["without"]))
+
+
+def examine(build, mechanism):
+    """Whether what needs the mechanism fails without it, and what it says."""
+    with tempfile.TemporaryDirectory() as overlay:
+        taken_out(mechanism, overlay)
+        program, *arguments = shlex.split(mechanism["needed_by"])
+        target = "ftcs" if program == "ftcs" else f"bin/{program}"
+        objects = {name: build.compile(name, overlay) for name in build.changed(mechanism["file"], target)}
+        run = subprocess.run([build.link(target, objects, overlay), *arguments], cwd=ROOT, capture_output=True, text=True, timeout=900)
+    said = run.stdout + run.stderr
+    missed = re.findall(r"^MISSED (?!.*not required).*|(?<=^\[  FAILED  \] )\w+[./][^\s,]+", said, re.M)
+    return run.returncode == 1 and missed, "; ".join(dict.fromkeys(missed))[:300] or f"exit code {run.returncode}: {said[-300:]}"
+
+
+def main():
+    build = Build(sys.argv[1])
+    with open(os.path.join(HERE, "mechanisms.toml"), "rb") as file:
+        mechanisms = [each for each in tomllib.load(file)["mechanism"] if len(sys.argv) < 3 or sys.argv[2] in each["name"]]
+    idle = 0
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for mechanism, (needed, said) in zip(mechanisms, pool.map(lambda each: examine(build, each), mechanisms)):
+            print(f"{'needed' if needed else 'IDLE':6}  {mechanism['name']:52} {said if needed else mechanism['needed_by'] + ' passes: ' + said}", flush=True)
+            idle += not needed
+    print(f"{len(mechanisms)} mechanisms, {idle} that nothing needs")
+    return 1 if idle or not mechanisms else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
