@@ -110,7 +110,12 @@ Histogram histogram(std::span<const double> values, double lower, double upper, 
   result.lower = lower;
   result.upper = upper;
   result.counts.assign(bins, 0);
-  const double width = upper - lower;  // perhaps so small that bins / width would overflow
+  const double count = static_cast<double>(bins);
+  const double width = upper - lower;
+  // In this order whole numbers on the edges of whole bins stay exact. The width may be so small
+  // that the quotient is no double.
+  const double per_unit = count / width;
+  const bool exact = std::isfinite(per_unit);
   for (const double value : values) {
     if (!std::isfinite(value)) continue;
     if (value < lower) {
@@ -119,8 +124,8 @@ Histogram histogram(std::span<const double> values, double lower, double upper, 
       ++result.above;
     } else {
       // The last bin is closed on the right, so that the maximum belongs to it.
-      const auto bin =
-          static_cast<std::size_t>((value - lower) / width * static_cast<double>(bins));
+      const double along = value - lower;
+      const auto bin = static_cast<std::size_t>(exact ? along * per_unit : along / width * count);
       ++result.counts[std::min(bin, bins - 1)];
     }
   }

@@ -120,6 +120,18 @@ TEST(Histogram, chooses_a_range_that_holds_everything) {
   EXPECT_LE(bins.counts.size(), 200U);
 }
 
+TEST(Histogram, of_whole_numbers_in_bins_of_whole_numbers_has_no_gaps) {
+  for (std::size_t bins = 1; bins <= 200; ++bins) {
+    for (const double width : {1.0, 2.0, 5.0, 8.0}) {
+      std::vector<double> edges;
+      for (std::size_t k = 0; k < bins; ++k) edges.push_back(width * static_cast<double>(k));
+      const double upper = width * static_cast<double>(bins);
+      EXPECT_EQ(histogram(edges, 0.0, upper, bins).counts, std::vector<std::uint64_t>(bins, 1))
+          << bins << " bins of " << width;
+    }
+  }
+}
+
 TEST(Histogram, of_values_a_denormal_apart_is_defined) {
   constexpr double kSmall = 3e-321;  // its reciprocal is not a double
   const double values[] = {0.0, kSmall / 2, kSmall};
