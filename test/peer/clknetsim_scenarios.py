@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """What the nodes of clknetsim_table.py do to each other: delays and frequencies as clknetsim's expressions, and the limits."""
 import math
+import os
 import random
 
 START = 12.0  # s: by then a transmitter has been selected
+FREE_RUNNING = 10.4  # s, until a transmitter has been selected
 CYCLES = 1200
 LINK = "10e-6"
 

@@ -24,9 +24,8 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from clknetsim_scenarios import CYCLES, LINK, PHC_SCENARIOS, SCENARIOS, START  # noqa: E402
+from clknetsim_scenarios import LINK, PHC_SCENARIOS, SCENARIOS  # noqa: E402
 
-FREE_RUNNING = 10.4  # s, until a transmitter has been selected
 MEASURED = 600
 
 
