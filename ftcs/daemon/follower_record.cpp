@@ -267,9 +267,18 @@ void FollowerRecord::watch_output() {
     log_(LogLevel::kWarning, "standard output: {}; samples are lost, the clock is steered on",
          platform::write_failure(samples_.error()));
   }
-  if (const std::uint64_t lost = samples_.take_lost(); lost > 0) {
-    log_(LogLevel::kWarning, "standard output: {} samples lost, nobody reads them", lost);
-  }
+  samples_lost_ += samples_.take_lost();
+  if (samples_lost_ < 2 * samples_lost_told_ || samples_lost_ == 0) return;
+  tell_lost_samples();
+}
+
+// The first, then each time that they have doubled, and all at the end: a slow reader floods no
+// log.
+void FollowerRecord::tell_lost_samples() {
+  if (samples_lost_ == samples_lost_told_) return;
+  log_(LogLevel::kWarning, "standard output: {} samples lost so far, nobody reads them in time",
+       samples_lost_);
+  samples_lost_told_ = samples_lost_;
 }
 
 int FollowerRecord::exit_code() const {
@@ -317,6 +326,7 @@ std::uint64_t FollowerRecord::samples_per_summary(std::optional<Duration> sync_i
 
 void FollowerRecord::log_summary() {
   state_.save();
+  tell_lost_samples();
   summary_.log(log_, discipline_.counters(), locked(), "samples");
 }
 

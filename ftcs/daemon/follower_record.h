@@ -69,6 +69,7 @@ class FollowerRecord {
 
  private:
   void watch_output();
+  void tell_lost_samples();
   void add_sync(const node::Steered& steered, double time_s, std::optional<Duration> sync_interval);
   void report(const SampleRecord& record, std::optional<Duration> sync_interval);
   [[nodiscard]] bool has_room_for_line(double time_s);
@@ -82,6 +83,8 @@ class FollowerRecord {
   double line_room_ = 16.0;  ///< for lines of samples
   double line_room_at_s_ = 0.0;
   std::uint64_t lines_left_out_ = 0;
+  std::uint64_t samples_lost_ = 0;
+  std::uint64_t samples_lost_told_ = 0;
   platform::LineWriter samples_{stdout};  ///< as JSON or CSV
   StateKeeper& state_;
   const ClockDiscipline& discipline_;

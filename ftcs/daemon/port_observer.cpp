@@ -47,6 +47,8 @@ diagnosis::PortSettings port_settings(const PtpOptions& options) {
   settings.lowest_peer_delay = peer.lowest;
   settings.highest_peer_delay = peer.highest;
   settings.unicast = options.socket.unicast.has_value();
+  settings.steers =
+      !options.follower.free_running && options.follower.servo.kind != ServoKind::kFreeRunning;
   return settings;
 }
 

@@ -100,7 +100,13 @@ void PtpPort::turn(std::optional<FreeRunningTime> end) {
 }
 
 void PtpPort::report_keys() {
-  if (!options_.protocol.security) return;
+  if (!options_.protocol.security) {
+    const std::string& file = options_.protocol.authentication.sa_file;
+    if (!file.empty()) {  // allowed, as for ptp4l: its ports need not name one
+      log_(LogLevel::kWarning, "sa_file {}: without spp no message is authenticated", file);
+    }
+    return;
+  }
   log_(LogLevel::kNotice, "messages are authenticated: {}",
        options_.protocol.security->description());
   if (options_.protocol.security->is_readable_by_others()) {

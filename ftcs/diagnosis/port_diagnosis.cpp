@@ -10,8 +10,9 @@ namespace {
 
 std::string figures(const PortSeen& seen) {
   // Whole numbers, as there is no -0 among them.
-  return fmt::format("offset {} ns, path delay {:.0f} ns, rate {:+.0f} ppb",
-                     seen.servo.offset.rounded_ns(), seen.servo.path_delay.ns(), seen.rate.ppb());
+  return fmt::format("offset {} ns, path delay {:.0f} ns, rate {:+.0f} ppb{}",
+                     seen.servo.offset.rounded_ns(), seen.servo.path_delay.ns(), seen.rate.ppb(),
+                     seen.settings.steers ? "" : "; it is measured alone, nothing is steered");
 }
 
 Finding acquiring(const PortSeen& seen) {
@@ -36,6 +37,7 @@ std::vector<Finding> diagnose_all(const PortSeen& seen) {
     auto steered = other_steers(seen);
     if (steered && !seen.clock.empty()) all.push_back(std::move(*steered));
     if (auto far = far_at_start(seen)) all.push_back(std::move(*far));
+    if (auto twins = one_identity(seen)) all.push_back(std::move(*twins));
     if (all.empty()) all.push_back({Cause::kLocked, figures(seen), "", ""});
   } else {
     const auto rules = seen.has_transmitter ? rules_of_measuring() : rules_of_hearing();

@@ -27,6 +27,7 @@ struct PortSettings {
   Nanoseconds lowest_peer_delay{};
   Nanoseconds highest_peer_delay{};
   bool unicast = false;  ///< one configured peer instead of the group
+  bool steers = true;    ///< else it measures alone
 };
 
 /// What came of it, lately: counters are those of the last `seconds`, so that a sentence is of now.

@@ -188,6 +188,9 @@ std::vector<Case> measured() {
        "changed 5 times"},
       {Cause::kTwoTransmitters, with(followed(), count(Counter::kSequenceRestarts, 5)),
        "one identity"},
+      {Cause::kTwoTransmitters, with(followed(), count(Counter::kStaleSync, 8)), "8 Syncs"},
+      {Cause::kTwoTransmitters, with(followed(), count(Counter::kContradictingFollowUp, 8)),
+       "one transmitter of each identity"},
       {Cause::kTimescale, with(followed(), [](PortSeen& s) { s.refusal = "it shows 1970"; }),
        "1970"},
       {Cause::kOtherSteers, with(followed(), [](PortSeen& s) { s.foreign_changes = 2; }), "chrony"},
@@ -285,6 +288,24 @@ TEST(PortDiagnosis, a_second_transmitter_is_remarked_on) {
   seen.at_port.on_message(other, Way::kUdpIpv4);
   const auto all = diagnose_all(seen);
   EXPECT_EQ(all.back().cause, Cause::kTwoTransmitters);
+}
+
+TEST(PortDiagnosis, a_clock_that_follows_two_transmitters_of_one_identity_is_in_doubt) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  seen.counters.add(Counter::kStaleSync, 7);
+  EXPECT_EQ(diagnose(seen).cause, Cause::kLocked) << "a transmitter that was started again";
+  seen.counters.add(Counter::kStaleSync, 1);
+  EXPECT_TRUE(sentence(diagnose(seen)).starts_with("in doubt: 8 Syncs"));
+  seen.counters.add(Counter::kForwardPairs, 100);
+  EXPECT_EQ(diagnose(seen).cause, Cause::kLocked) << "a few of many";
+}
+
+TEST(PortDiagnosis, what_steers_nothing_says_so) {
+  PortSeen seen = followed();
+  seen.locked = true;
+  seen.settings.steers = false;
+  EXPECT_TRUE(sentence(diagnose(seen)).ends_with("nothing is steered"));
 }
 
 TEST(PortDiagnosis, names_are_different_and_there_is_one_for_each_cause) {

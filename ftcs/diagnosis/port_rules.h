@@ -30,6 +30,8 @@ using PortRule = std::optional<Finding> (*)(const PortSeen& seen);
 [[nodiscard]] std::optional<Finding> other_steers(const PortSeen& seen);
 /// The real clock is too far from the reference, and nobody allows a step.
 [[nodiscard]] std::optional<Finding> far_at_start(const PortSeen& seen);
+/// Two transmitters call themselves the same.
+[[nodiscard]] std::optional<Finding> one_identity(const PortSeen& seen);
 /// The neighbour of a port that measures peer to peer does not answer.
 [[nodiscard]] std::optional<Finding> no_peer(const PortSeen& seen);
 

@@ -2,6 +2,7 @@
 //
 // Why a clock is not locked though a time transmitter is selected.
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -97,15 +98,17 @@ Found timescale(const PortSeen& seen) {
 
 Finding too_far(Duration offset, const PortSeen& seen) {
   const bool is_virtual = seen.clock.empty();
+  // UTC is behind TAI by 37 s since 2017; a clock that is set is within a second of one of them.
+  const bool on_utc = std::abs(offset.seconds() + 37.0) < 1.0;
   return Finding{
       Cause::kFirstOffset,
       fmt::format(
           "{} is {:+.3f} s from the reference, and without a step no more than 1 s is removed",
           is_virtual ? "the virtual clock" : seen.clock, offset.seconds()),
       "a clock near the reference at the start",
-      is_virtual
-          ? "--first-step allows one step; --offset 37s begins on TAI, where the reference is"
-          : "--first-step allows one step, or set the clock before"};
+      !is_virtual ? "--first-step allows one step, or set the clock before"
+      : on_utc ? "--first-step allows one step; --offset 37s begins on TAI, where the reference is"
+               : "--first-step allows one step"};
 }
 
 Found first_offset(const PortSeen& seen) {
@@ -181,6 +184,21 @@ std::optional<Finding> other_steers(const PortSeen& seen) {
       seen.locked};
 }
 
+/// Ids that had come before, with another time or too long ago for a copy. One restart makes a few.
+std::optional<Finding> one_identity(const PortSeen& seen) {
+  const ptp::Counters& count = seen.counters;
+  const std::uint64_t repeated =
+      count[Counter::kStaleSync] + count[Counter::kContradictingFollowUp];
+  constexpr std::uint64_t kFew = 8;
+  if (repeated < kFew || 4 * repeated < count[Counter::kForwardPairs]) return std::nullopt;
+  return Finding{Cause::kTwoTransmitters,
+                 fmt::format("{} Syncs in {:.0f} s repeat the sequenceId of others with another "
+                             "time: two transmitters have one identity, {}",
+                             repeated, seen.seconds, who(seen)),
+                 "one transmitter of each identity",
+                 "end one of them, or give it another clockIdentity", seen.locked};
+}
+
 std::optional<Finding> far_at_start(const PortSeen& seen) {
   return seen.first_offset ? Found(too_far(*seen.first_offset, seen)) : std::nullopt;
 }
@@ -203,10 +221,10 @@ std::optional<Finding> no_peer(const PortSeen& seen) {
 }
 
 std::span<const PortRule> rules_of_measuring() noexcept {
-  static constexpr std::array<PortRule, 12> kRules{
-      link_down,        no_receive_stamps, no_sync,      no_follow_up,
-      two_transmitters, timescale,         no_peer,      no_transmit_stamps,
-      no_delay_answer,  first_offset,      other_steers, samples_refused,
+  static constexpr std::array<PortRule, 13> kRules{
+      link_down,    no_receive_stamps, no_sync,         no_follow_up,       two_transmitters,
+      one_identity, timescale,         no_peer,         no_transmit_stamps, no_delay_answer,
+      first_offset, other_steers,      samples_refused,
   };
   return kRules;
 }

@@ -69,7 +69,7 @@ enum class Counter : std::uint8_t {
   kDuplicateSync,          ///< second copy dropped
   kDuplicateFollowUp,      ///< second copy dropped
   kEarlyFollowUp,          ///< before its Sync, while somebody forges such: dropped
-  kContradictingFollowUp,  ///< tells another time than an early one before it: dropped, as above
+  kContradictingFollowUp,  ///< tells another time than one before it for the same Sync: dropped
   kStaleSync,              ///< older than one that came before: dropped
   kStaleFollowUp,     ///< its pair would be older than one already emitted, or its Sync is unknown:
                       ///< dropped

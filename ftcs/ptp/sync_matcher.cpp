@@ -74,10 +74,13 @@ std::optional<EventPair> SyncMatcher::on_follow_up(const Header& header, const F
 void SyncMatcher::look_for_forgery(const Slot& slot, const Header& header,
                                    const FollowUp& follow_up, FreeRunningTime now,
                                    Counters& counters) noexcept {
-  if (!slot.follow_up_first) return;
-  if (slot.follow_up == follow_up.precise_origin + header.correction) return;  // a copy
-  counters.add(Counter::kContradictingFollowUp);
-  forged_at_ = now;
+  const bool copy = slot.follow_up == follow_up.precise_origin + header.correction;
+  const bool forged = slot.follow_up_first && !copy;
+  // The path of a copy may have another correction; its time is the same.
+  if (forged || slot.origin != follow_up.precise_origin) {
+    counters.add(Counter::kContradictingFollowUp);
+  }
+  if (forged) forged_at_ = now;
 }
 
 bool SyncMatcher::admit_sync(std::uint16_t sequence_id, FreeRunningTime now,

@@ -231,6 +231,22 @@ TEST_F(Receiver, follow_ups_before_their_sync_count_until_one_is_contradicted) {
   EXPECT_EQ(count(Counter::kEarlyFollowUp), 39U);
 }
 
+TEST_F(Receiver, two_transmitters_of_one_identity_are_counted_as_such_and_copies_are_not) {
+  select_a();
+  for (std::uint16_t i = 0; i < 10; ++i) {
+    const Nanoseconds sent = 1s + 125ms * i;
+    static_cast<void>(exchange(i, sent));
+    static_cast<void>(general(follow_up(i, sent), sent + 1ms));
+  }
+  EXPECT_EQ(count(Counter::kContradictingFollowUp), 0U);
+  for (std::uint16_t i = 10; i < 20; ++i) {
+    const Nanoseconds sent = 1s + 125ms * i;
+    static_cast<void>(exchange(i, sent));
+    static_cast<void>(general(follow_up(i, sent + 2ms), sent + 3ms));
+  }
+  EXPECT_EQ(count(Counter::kContradictingFollowUp), 10U);
+}
+
 TEST_F(Receiver, an_answer_an_hour_off_is_no_delay) {
   select_a();
   const auto id = of<SendMessage>(event(sync_from(kA, 0), 1s))[0].sequence_id;

@@ -41,6 +41,8 @@ CASES = [
     case("no Delay_Resp", "raw", ["delay_resp=0"], [], "no_delay_resp", "do not reach the transmitter"),
     case("Delay_Resp to others", "raw", ["resp_to_others=1"], [], "delay_resp_for_others", "serves others alone"),
     case("two clocks with one identity", "raw", ["twins=1"], [], "two_transmitters", "clockIdentity"),
+    case("two clocks with one identity at the same time", "raw", [], ["--first-step"], "two_transmitters", "end one of them",
+         second=["ahead=37.002"]),
     case("two transmitters disagree", "raw", ["priority1=100"], ["--first-step"], "transmitters_disagree", "--acceptable-transmitter",
          second=["identity=0a0b0cfffe0102ff", "ahead=37.05"]),
     case("an asymmetric path", "raw", ["priority1=100"], ["--first-step"], "transmitters_disagree", "asymmetric by twice as much",
