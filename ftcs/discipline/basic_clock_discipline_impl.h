@@ -127,6 +127,7 @@ void BasicClockDiscipline<Servo>::begin(const ClockReading& reading) noexcept {
   telemetry_.step = Duration{};
   telemetry_.offset_refused = false;
   telemetry_.error.reset();
+  if (!first_command_) telemetry_.applied_rate = rate_change_.in_force(reading.free_running);
 }
 
 template <ClockServo Servo>

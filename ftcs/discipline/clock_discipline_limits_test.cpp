@@ -104,6 +104,8 @@ TEST_F(ClockDisciplineTest, no_offset_beyond_the_bound_is_followed_at_any_time) 
   discipline_->on_new_reference();
   reference_jump_ = Nanoseconds{10s};
   for (int n = 0; n < 100; ++n) sync_and_wait();
+  const Telemetry refused = sync_and_wait();
+  EXPECT_EQ(refused.applied_rate, refused.tracking_rate) << "the last correction expired long ago";
   EXPECT_EQ(discipline_->counters().commands, commands);
   EXPECT_GE(discipline_->counters().refused, 99U);
   EXPECT_FALSE(discipline_->locked());

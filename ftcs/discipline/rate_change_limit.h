@@ -58,6 +58,11 @@ class RateChangeLimit {
     end_ = has_correction(command) ? now + correction_length(command) : now;
   }
 
+  /// What the clock runs at now, by the last command noted.
+  [[nodiscard]] Rate in_force(FreeRunningTime now) const noexcept {
+    return Rate::from_ratio(now < end_ ? correction_ : tracking_);
+  }
+
  private:
   double largest_;
   bool begun_ = false;

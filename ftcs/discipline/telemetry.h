@@ -34,11 +34,11 @@ struct Telemetry {
   SampleVerdict verdict = SampleVerdict::kUsed;
   ServoSnapshot servo{};   ///< servo.state is kHoldover while samples are missing
   ClockReading reading{};  ///< of the steered clock, when the message was handled
-  Rate applied_rate{};     ///< correction rate of the command in force (its tracking rate if it has
-                           ///< none)
-  Rate tracking_rate{};    ///< what the clock runs at once the correction has expired
-  bool commanded = false;  ///< this message made a command, and the clock took it
-  Duration step{};         ///< that came with it
+  Rate applied_rate{};   ///< of the command in force: its correction rate, and once the correction
+                         ///< has expired its tracking rate
+  Rate tracking_rate{};  ///< what the clock runs at once the correction has expired
+  bool commanded = false;             ///< this message made a command, and the clock took it
+  Duration step{};                    ///< that came with it
   bool offset_refused = false;        ///< the offset exceeds largest_offset
   bool locked = false;                ///< LockDetector
   std::optional<ClockError> error{};  ///< the clock refused the command
