@@ -81,7 +81,10 @@ int analyse(AnalyseOptions options) {
   }
   if (!options.kind.empty()) options.series.kind = kind_named(options.kind);
   if (options.interval_s > 0.0) options.series.interval_s = options.interval_s;
-  if (!can_write_results({options.json, options.csv, options.html})) return kRuntimeError;
+  const int refused =
+      check_results({{"--json", options.json}, {"--csv", options.csv}, {"--html", options.html}},
+                    {{"FILE", options.file}});
+  if (refused != kSuccess) return refused;
   auto series = read_series(options.file, options.series);
   if (!series) {
     fmt::print(stderr, "ftcs: {}\n", series.error().text());

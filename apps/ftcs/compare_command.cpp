@@ -55,7 +55,8 @@ int compare_log(const CompareOptions& options) {
   std::vector<std::string> names = files.servos;
   const auto libraries = load_servos(names);
   if (!knows_servos(names)) return kUsageError;
-  if (!can_write_results({files.json, files.csv, files.html, files.trace})) return kRuntimeError;
+  const int refused = check_sweep_results(files, {{"--log", options.log}});
+  if (refused != kSuccess) return refused;
   auto log = read_recorded_log(options.log, options.source);
   if (!log) {
     fmt::print(stderr, "ftcs: {}\n", log.error().text());
@@ -76,7 +77,8 @@ int compare_log(const CompareOptions& options) {
 int compare(const CompareOptions& options) {
   if (!options.log.empty()) return compare_log(options);
   if (!options.file.empty()) {
-    return run_and_report(experiment::load_scenarios(options.file), options.file, options.sweep);
+    const SweepSource source{options.file, {{"FILE", options.file}}};
+    return run_and_report(experiment::load_scenarios(options.file), source, options.sweep);
   }
   const ExperimentFolder folder = find_experiments(options.suite.empty() ? "peers" : options.suite);
   std::vector<experiment::Scenario> scenarios = parse_all(folder.files);
@@ -84,7 +86,8 @@ int compare(const CompareOptions& options) {
     std::erase_if(scenarios,
                   [](const experiment::Scenario& s) { return s.name != kDefaultScenario; });
   }
-  return run_and_report(std::move(scenarios), folder.origin, options.sweep);
+  return run_and_report(std::move(scenarios), {folder.origin, inputs_of(folder, "--suite")},
+                        options.sweep);
 }
 
 struct SimulateOptions {
@@ -94,11 +97,12 @@ struct SimulateOptions {
 
 int simulate(const SimulateOptions& options) {
   std::vector<experiment::Scenario> scenarios;
-  std::string source;
+  SweepSource source;
   for (const std::string& file : options.files) {
     for (auto& scenario : experiment::load_scenarios(file))
       scenarios.push_back(std::move(scenario));
-    source += (source.empty() ? "" : " ") + file;
+    source.name += (source.name.empty() ? "" : " ") + file;
+    source.files.push_back({"FILE", file});
   }
   return run_and_report(std::move(scenarios), source, options.sweep);
 }

@@ -64,7 +64,8 @@ int write_files(const DemoOptions& demo, const DemoFiles& files, const DemoResul
 
 /// Runs both parts; prints tables and sentences. Returns an exit code: both locked or not.
 int run_demo(const DemoOptions& demo, const DemoFiles& files) {
-  if (!can_write_results({files.json, files.html})) return kRuntimeError;
+  const int refused = check_results({{"--json", files.json}, {"--html", files.html}});
+  if (refused != kSuccess) return refused;
   platform::LinuxKernel kernel;
   DemoResult result;
   if (demo.ptp) {

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 ExperimentFolder read_folder(const fs::path& folder) {
-  ExperimentFolder result{folder.string(), {}};
+  ExperimentFolder result{folder.string(), {}, false};
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.path().extension() != ".toml") continue;
     result.files.push_back(
@@ -26,7 +26,7 @@ ExperimentFolder read_folder(const fs::path& folder) {
 }
 
 ExperimentFolder read_embedded(const std::string& name) {
-  ExperimentFolder result{name + " (built in)", {}};
+  ExperimentFolder result{name + " (built in)", {}, true};
   for (const EmbeddedExperiment& file : embedded_experiments()) {
     const std::string path(file.path);
     if (path.rfind(name + "/", 0) == 0) result.files.push_back({path, file.text()});
@@ -48,6 +48,13 @@ ExperimentFolder find_experiments(const std::string& name) {
   std::sort(folder.files.begin(), folder.files.end(),
             [](const ExperimentFile& a, const ExperimentFile& b) { return a.path < b.path; });
   return folder;
+}
+
+std::vector<NamedFile> inputs_of(const ExperimentFolder& folder, const std::string& option) {
+  std::vector<NamedFile> inputs;
+  if (folder.built_in) return inputs;
+  for (const ExperimentFile& file : folder.files) inputs.push_back({option, file.path});
+  return inputs;
 }
 
 }  // namespace ftcs::app

@@ -5,7 +5,7 @@
 
 #include <fmt/core.h>
 
-#include "ftcs/report/write_file.h"
+#include "apps/ftcs/commands.h"
 
 namespace ftcs::app {
 
@@ -19,15 +19,19 @@ bool write_result(const std::string& path, const std::string& content) {
   return true;
 }
 
-bool can_write_results(std::initializer_list<std::string> paths) {
-  for (const std::string& path : paths) {
-    if (path.empty() || path == "-") continue;
-    if (const auto error = check_writable(path)) {
+int check_results(const std::vector<NamedFile>& results, const std::vector<NamedFile>& inputs) {
+  if (const auto error = check_distinct(results, inputs)) {
+    fmt::print(stderr, "ftcs: {}\n", error->message);
+    return kUsageError;
+  }
+  for (const NamedFile& result : results) {
+    if (result.path.empty() || result.path == "-") continue;
+    if (const auto error = check_writable(result.path)) {
       fmt::print(stderr, "ftcs: {}\n", error->message);
-      return false;
+      return kRuntimeError;
     }
   }
-  return true;
+  return kSuccess;
 }
 
 }  // namespace ftcs::app

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <initializer_list>
 #include <string>
+#include <vector>
+
+#include "ftcs/report/write_file.h"
 
 namespace ftcs::app {
 
@@ -10,8 +12,10 @@ namespace ftcs::app {
 /// standard error says why.
 [[nodiscard]] bool write_result(const std::string& path, const std::string& content);
 
-/// Before the run that leads to them: can these files be written? Empty paths and "-" can. False:
-/// standard error says which cannot, and why.
-[[nodiscard]] bool can_write_results(std::initializer_list<std::string> paths);
+/// Before the run that leads to them: kSuccess if these results can be written, and none of them
+/// over another or over what is read. Else standard error says which cannot, and why: kUsageError,
+/// two options with one file; kRuntimeError, a file that cannot be written.
+[[nodiscard]] int check_results(const std::vector<NamedFile>& results,
+                                const std::vector<NamedFile>& inputs = {});
 
 }  // namespace ftcs::app

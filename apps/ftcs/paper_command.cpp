@@ -48,6 +48,13 @@ std::vector<experiment::PaperTable> load_tables(const PaperOptions& options) {
   return tables;
 }
 
+std::vector<NamedFile> inputs(const PaperOptions& options) {
+  if (options.section != "4") return {};
+  auto files = inputs_of(find_experiments(options.folder), "--experiments");
+  for (const std::string& servo : options.servos) files.push_back({"--servo", servo});
+  return files;
+}
+
 int reproduce(const PaperOptions& options) {
   std::vector<std::string> names = options.servos;
   const auto libraries = load_servos(names);
@@ -158,10 +165,10 @@ void add_paper_command(CLI::App& app, int& exit_code) {
       exit_code = kUsageError;
       return;
     }
-    if (!can_write_results({options->json, options->csv, options->html})) {
-      exit_code = kRuntimeError;
-      return;
-    }
+    exit_code = check_results(
+        {{"--json", options->json}, {"--csv", options->csv}, {"--html", options->html}},
+        inputs(*options));
+    if (exit_code != kSuccess) return;
     exit_code = options->section == "5" ? reproduce_section5(*options) : reproduce(*options);
   });
 }

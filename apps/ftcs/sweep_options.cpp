@@ -194,7 +194,19 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
   command.add_flag("-q,--quiet", options.quiet, "print nothing to the console");
 }
 
-int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
+int check_sweep_results(const SweepOptions& options, std::vector<NamedFile> inputs) {
+  for (const std::string& servo : options.servos) {
+    if (experiment::ServoLibrary::is_path(servo)) inputs.push_back({"--servo", servo});
+  }
+  for (const std::string& part : options.merge) inputs.push_back({"--merge", part});
+  return check_results({{"--json", options.json},
+                        {"--csv", options.csv},
+                        {"--html", options.html},
+                        {"--trace", options.trace}},
+                       inputs);
+}
+
+int run_and_report(std::vector<Scenario> scenarios, const SweepSource& source,
                    const SweepOptions& options) {
   const ServoLibraries own = apply(options, scenarios);
   if (!options.trace.empty() && scenarios.size() != 1) {
@@ -202,9 +214,8 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
         fmt::format("--trace follows one scenario, {} were given", scenarios.size()));
   }
   const experiment::Shard shard = parse_shard(options.shard);
-  if (!can_write_results({options.json, options.csv, options.html, options.trace})) {
-    return kRuntimeError;
-  }
+  if (const int refused = check_sweep_results(options, source.files); refused != kSuccess)
+    return refused;
   const platform::Interrupt interrupt;
   SweepResult sweep;
   if (!options.merge.empty()) {
@@ -230,7 +241,7 @@ int run_and_report(std::vector<Scenario> scenarios, const std::string& source,
     fmt::print(stderr, "ftcs: {} of {} runs are missing: are all shards there?\n",
                runs_of(scenarios) - runs_in(sweep), runs_of(scenarios));
   }
-  const SweepOrigin origin{source, FTCS_VERSION};
+  const SweepOrigin origin{source.name, FTCS_VERSION};
   bool written =
       options.json.empty() || write_result(options.json, dump(sweep_json(sweep, origin, true)));
   written &= options.csv.empty() || write_result(options.csv, suite_table(sweep).to_csv());

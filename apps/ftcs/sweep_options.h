@@ -8,6 +8,7 @@
 
 #include "ftcs/experiment/scenario_run.h"
 #include "ftcs/experiment/servo_library.h"
+#include "ftcs/report/write_file.h"
 
 namespace CLI {
 class App;
@@ -41,8 +42,18 @@ void say_doubts(const ServoLibraries& libraries);
 
 void add_sweep_options(CLI::App& command, SweepOptions& options);
 
+/// Can the results be written, none of them over another or over what is read: `inputs`, servos of
+/// one's own, shards? As check_results().
+[[nodiscard]] int check_sweep_results(const SweepOptions& options, std::vector<NamedFile> inputs);
+
+/// Where the scenarios came from.
+struct SweepSource {
+  std::string name;
+  std::vector<NamedFile> files;
+};
+
 /// Runs, prints and writes; the exit code.
 [[nodiscard]] int run_and_report(std::vector<experiment::Scenario> scenarios,
-                                 const std::string& source, const SweepOptions& options);
+                                 const SweepSource& source, const SweepOptions& options);
 
 }  // namespace ftcs::app

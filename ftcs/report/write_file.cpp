@@ -50,6 +50,19 @@ std::optional<WriteError> write_directly(const std::filesystem::path& path,
   return failure(path, code);
 }
 
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code problem;
+  const auto status = std::filesystem::status(a, problem);
+  if (std::filesystem::exists(status) && std::filesystem::exists(b, problem)) {
+    return std::filesystem::is_regular_file(status) && std::filesystem::equivalent(a, b, problem);
+  }
+  const auto whole = [&problem](const std::filesystem::path& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, problem), problem);
+  };
+  const auto first = whole(a);
+  return !first.empty() && first == whole(b);
+}
+
 }  // namespace
 
 std::optional<WriteError> write_file(const std::filesystem::path& path, std::string_view content) {
@@ -80,6 +93,28 @@ std::optional<WriteError> check_writable(const std::filesystem::path& path) {
   if (part.file == nullptr) return failure(path, errno);
   std::fclose(part.file);
   std::filesystem::remove(part.path, ignored);
+  return std::nullopt;
+}
+
+std::optional<WriteError> check_distinct(const std::vector<NamedFile>& results,
+                                         const std::vector<NamedFile>& inputs) {
+  std::vector<const NamedFile*> written;
+  for (const NamedFile& result : results) {
+    if (result.path.empty() || result.path == "-") continue;
+    const std::string named = result.option + " " + result.path.string();
+    for (const NamedFile& input : inputs) {
+      const auto& source = input.path == "-" ? std::filesystem::path("/dev/stdin") : input.path;
+      if (source.empty() || !is_same_file(result.path, source)) continue;
+      return WriteError{named + " would overwrite what is read: " + input.option + " " +
+                        input.path.string() + " is the same file"};
+    }
+    for (const NamedFile* other : written) {
+      if (!is_same_file(result.path, other->path)) continue;
+      return WriteError{named + " would overwrite another result: " + other->option + " " +
+                        other->path.string() + " is the same file"};
+    }
+    written.push_back(&result);
+  }
   return std::nullopt;
 }
 

@@ -106,5 +106,27 @@ TEST_F(WriteFile, asking_beforehand_changes_nothing) {
   EXPECT_EQ(content(folder_ / "x.part0"), "of somebody else");
 }
 
+TEST_F(WriteFile, tells_results_that_would_take_the_place_of_an_input_or_of_each_other) {
+  std::ofstream(folder_ / "in") << "precious";
+  std::filesystem::create_symlink("in", folder_ / "link");
+  std::filesystem::create_hard_link(folder_ / "in", folder_ / "hard");
+  const std::vector<NamedFile> inputs{{"FILE", folder_ / "in"}};
+  for (const auto& path :
+       {folder_ / "in", folder_ / "." / "in", folder_ / "link", folder_ / "hard"}) {
+    const auto error = check_distinct({{"--csv", path}}, inputs);
+    ASSERT_TRUE(error.has_value()) << path;
+    EXPECT_EQ(error->message, "--csv " + path.string() + " would overwrite what is read: FILE " +
+                                  (folder_ / "in").string() + " is the same file");
+  }
+  const auto twice =
+      check_distinct({{"--json", folder_ / "new"}, {"--csv", folder_ / "." / "new"}}, inputs);
+  ASSERT_TRUE(twice.has_value());
+  EXPECT_NE(twice->message.find("would overwrite another result: --json"), std::string::npos);
+  EXPECT_FALSE(check_distinct({{"--json", folder_ / "new"}, {"--csv", folder_ / "newer"}}, inputs));
+  EXPECT_FALSE(check_distinct({{"--json", ""}, {"--csv", ""}}, inputs)) << "none is none";
+  EXPECT_FALSE(check_distinct({{"--json", "-"}, {"--csv", "-"}}, inputs));
+  EXPECT_FALSE(check_distinct({{"--json", "/dev/null"}, {"--csv", "/dev/null"}}, inputs));
+}
+
 }  // namespace
 }  // namespace ftcs

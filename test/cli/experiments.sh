@@ -59,6 +59,35 @@ expect 1 'empty.toml: no line of a known format' compare --log empty.toml
 expect 1 'binary.toml' compare --log binary.toml
 expect 1 'No space left on device' simulate good.toml -q --json /dev/full
 
+# What is read is never written over, nor one result over another: links and other spellings are the same file.
+printf 'time_s,offset_ns\n0,5\n1,-3\n2,4\n3,0\n4,1\n' > record.csv
+cp record.csv record.kept
+cp good.toml good.kept
+ln -s record.csv record.link
+ln record.csv record.hard
+for name in record.csv ./record.csv "$folder/record.csv" record.link record.hard; do
+  for flag in --json --csv --html; do
+    expect 2 "$flag $name would overwrite what is read: FILE record.csv is the same file" analyse record.csv $flag "$name"
+    expect 2 "$flag $name would overwrite what is read: --log record.csv is the same file" compare --log record.csv $flag "$name"
+  done
+done
+expect 2 '--trace record.csv would overwrite what is read' compare --log record.csv --trace record.csv
+expect 2 '--csv record.csv would overwrite what is read: FILE - is the same file' analyse - --csv record.csv < record.csv
+expect 2 '--csv ./same would overwrite another result: --json same is the same file' analyse record.csv --json same --csv ./same
+expect 2 '--html same would overwrite another result: --csv same' compare good.toml --csv same --html same
+expect 2 '--json good.toml would overwrite what is read: FILE good.toml' simulate good.toml --json good.toml
+expect 2 '--csv good.toml would overwrite what is read: FILE good.toml' compare good.toml --csv good.toml
+expect 2 '--json part.json would overwrite what is read: --merge part.json' simulate good.toml --merge part.json --json part.json
+expect 2 '--csv same would overwrite another result: --json same' paper --json same --csv same
+expect 2 '--html same would overwrite another result: --json same' demo --json same --html same
+cmp record.csv record.kept || fail "the record was written over"
+cmp good.toml good.kept || fail "the scenario was written over"
+[ -e same ] && fail "a refused result was begun"
+"$ftcs" analyse record.csv -q --json /dev/null --csv /dev/null || fail "a device takes any number of results"
+mkdir suite
+cp good.toml suite/
+expect 2 '--csv suite/good.toml would overwrite what is read: --suite suite/good.toml' compare --suite suite --csv suite/good.toml
+
 # Results that cannot be written are known before anything runs (these runs would take hours or minutes), and
 # what exists stays until there is something to write.
 sed 's/seeds = 5/seeds = 1000000/' good.toml > endless.toml

@@ -181,7 +181,10 @@ int with_options(EthercatArguments arguments, Run run) {
     fmt::print(stderr, "ftcs ethercat: {}\n", *wrong);
     return kUsageError;
   }
-  if (!can_write_results({arguments.options.json, arguments.options.html})) return kRuntimeError;
+  const daemon::RunOptions& files = arguments.options;
+  const int refused =
+      check_results({{"--json", files.json}, {"--csv", files.csv}, {"--html", files.html}});
+  if (refused != kSuccess) return refused;
   std::string& socket = arguments.options.status_socket;
   arguments.options.status_socket_given = !socket.empty();
   if (socket.empty()) socket = platform::writable_socket_path(daemon::kEthercatSocketName);

@@ -109,7 +109,8 @@ int run_segment(SegmentArguments arguments) {
     return kUsageError;
   }
   const daemon::SegmentOptions& options = arguments.options;
-  if (!can_write_results({options.json, options.clock_csv})) return kRuntimeError;
+  const int refused = check_results({{"--json", options.json}, {"--clock-csv", options.clock_csv}});
+  if (refused != kSuccess) return refused;
   platform::LinuxKernel kernel;
   auto link = options.interface.empty()
                   ? platform::EthercatLink::listen_udp(kernel, options.address, options.port)
