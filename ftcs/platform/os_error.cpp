@@ -48,6 +48,8 @@ const char* reason(const OsError& error) {
       return "the requested time stamping is not supported";
     case OsErrorKind::kNoSuchDevice:
       return "no such device";
+    case OsErrorKind::kForeignFile:
+      return "it holds something else and is left as it is";
     case OsErrorKind::kSystem:
       break;
   }

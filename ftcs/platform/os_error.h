@@ -16,6 +16,7 @@ enum class OsErrorKind : std::uint8_t {
   kAddressInUse,     ///< another program holds the port
   kTimestampingUnsupported,  ///< the requested kind of timestamp is not to be had
   kNoSuchDevice,             ///< /dev/ptpN is not there
+  kForeignFile,              ///< a file that is there holds something else and must stay
   kSystem,                   ///< anything else: see number
 };
 

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/platform/time_page.h"
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstring>
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/mman.h>
@@ -16,11 +19,25 @@ constexpr std::size_t kSize = 4096;
 /// A writer that says nothing for so long is gone: it writes once a second at least.
 constexpr std::int64_t kFreshNs = 3'000'000'000;
 
+/// 0, errno, or EEXIST: what is there is somebody else's.
+int check_content(int file, off_t size) {
+  if (size == 0) return 0;
+  if (size != static_cast<off_t>(kSize)) return EEXIST;
+  std::array<char, kSize> content{};
+  const ssize_t count = ::pread(file, content.data(), kSize, 0);
+  if (count < 0) return errno;
+  std::uint32_t magic = 0;
+  std::memcpy(&magic, content.data(), sizeof magic);
+  const bool zeros = std::all_of(content.begin(), content.end(), [](char c) { return c == 0; });
+  return magic == FTCS_TIME_PAGE_MAGIC || zeros ? 0 : EEXIST;
+}
+
 /// 0 or errno.
 int make_page(int file) {
   struct stat status {};
   if (::fstat(file, &status) != 0) return errno;
   if (!S_ISREG(status.st_mode)) return EINVAL;
+  if (const int code = check_content(file, status.st_size); code != 0) return code;
   constexpr mode_t kReadable = 0644;
   if (::fchmod(file, kReadable) != 0 || ::ftruncate(file, kSize) != 0) return errno;
   return 0;
@@ -30,7 +47,11 @@ int make_page(int file) {
 
 Result<TimePage, OsError> TimePage::open(const std::string& path) {
   constexpr mode_t kReadable = 0644;
-  const auto failed = [&path](int code) { return os_error(code, "time page " + path); };
+  const auto failed = [&path](int code) {
+    OsError error = os_error(code, "time page " + path);
+    if (code == EEXIST) error.kind = OsErrorKind::kForeignFile;
+    return error;
+  };
   const int file =
       ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kReadable);
   if (file < 0) return failed(errno);

@@ -23,8 +23,9 @@ class TimePage {
     double growth = 0.0;
   };
 
-  /// Makes the file, or takes the one that is there: a regular one, by no link. Mode 0644.
-  /// EBUSY: somebody else writes it.
+  /// Makes the file, or takes the one that is there: a regular one, by no link, that is a page
+  /// already, or empty, or a page's size of zeros (the machine went down as it was made). Mode
+  /// 0644. EBUSY: somebody else writes it. EEXIST: it holds something else, which stays.
   [[nodiscard]] static Result<TimePage, OsError> open(const std::string& path);
 
   TimePage(TimePage&& other) noexcept;

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <sys/stat.h>
@@ -115,6 +116,40 @@ TEST_F(TimePageTest, a_reader_cannot_write) {
   struct stat file {};
   ASSERT_EQ(::stat(path_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 0777, 0644U);
+}
+
+std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST_F(TimePageTest, a_file_of_somebody_else_is_left_as_it_is) {
+  constexpr std::size_t kPage = 4096;
+  const std::string path = folder_ + "/other";
+  for (const std::string& text : {std::string("precious\n"), std::string(kPage, 'x'),
+                                  std::string(kPage - 1, '\0'), std::string(2 * kPage, '\0')}) {
+    std::ofstream(path, std::ios::binary) << text;
+    ASSERT_EQ(::chmod(path.c_str(), 0600), 0);
+    const auto opened = TimePage::open(path);
+    ASSERT_FALSE(opened.ok());
+    EXPECT_EQ(opened.error().message(),
+              "time page " + path + ": it holds something else and is left as it is");
+    EXPECT_EQ(content(path), text);
+    struct stat file {};
+    ASSERT_EQ(::stat(path.c_str(), &file), 0);
+    EXPECT_EQ(file.st_mode & 0777, 0600U);
+  }
+}
+
+TEST_F(TimePageTest, an_empty_file_an_older_page_and_an_unfinished_one_are_taken) {
+  std::ofstream(folder_ + "/empty").close();
+  std::ofstream(folder_ + "/zeros", std::ios::binary) << std::string(4096, '\0');
+  page_.reset();
+  for (const std::string& path : {folder_ + "/empty", folder_ + "/zeros", path_}) {
+    const auto opened = TimePage::open(path);
+    EXPECT_TRUE(opened.ok()) << path;
+    EXPECT_NE(ftcs_open_time(path.c_str()), nullptr) << path;
+  }
 }
 
 TEST_F(TimePageTest, links_and_what_is_no_file_are_refused) {

@@ -65,4 +65,8 @@ outside=$(cut -d' ' -f3 "$folder/told")
 echo "$outside of $locked outside (software stamps: their asymmetry is not known to anybody)"
 "$ftcs" ptp "${udp[@]}" --time-page /dev/null > "$folder/null" 2>&1 && fail "a device is no page"
 grep -q "time page /dev/null" "$folder/null" || fail "no clear error"
+echo precious > "$folder/other"
+"$ftcs" ptp "${udp[@]}" --time-page "$folder/other" > "$folder/refused" 2>&1
+[ $? -eq 1 ] && grep -q "time page $folder/other: it holds something else and is left as it is" "$folder/refused" || fail "no clear error of a file that is no page"
+[ "$(cat "$folder/other")" = precious ] || fail "a file that is no page was written over"
 echo "the page tells the time and between which instants it is"
