@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kBufferSize = 65536;
 constexpr std::size_t kLongestExcerpt = 40;
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool is_text(char byte) {
   const auto code = static_cast<unsigned char>(byte);
@@ -110,6 +111,7 @@ std::optional<std::string_view> LineReader::next() {
     }
   }
   ++line_number_;
+  if (line_number_ == 1 && line_.starts_with(kByteOrderMark)) line_.erase(0, kByteOrderMark.size());
   if (!line_.empty() && line_.back() == '\r') line_.pop_back();
   if (!std::all_of(line_.begin(), line_.end(), is_text)) {
     error_ = error_here("expected text or gzip, got binary data");

@@ -25,7 +25,8 @@ struct ReadError {
 /// '?', in quotes.
 [[nodiscard]] std::string quoted_excerpt(std::string_view text);
 
-/// Lines of a text file, gzip or plain, in constant memory. "-" is the standard input.
+/// Lines of a text file, gzip or plain, in constant memory. "-" is the standard input. A byte-order
+/// mark of UTF-8 at the start, as spreadsheets write it, is no part of the first line.
 ///
 /// A file that is not text (a control character other than tab, form feed and carriage return, or a
 /// line above kLongestLine) and a gzip file that ends too early are errors: reading stops there.

@@ -45,6 +45,15 @@ TEST_F(LineReaderTest, gives_lines_without_their_ends) {
   EXPECT_EQ(lines(), (Lines{"a", "", "b"}));
 }
 
+TEST_F(LineReaderTest, skips_a_byte_order_mark_at_the_start_alone) {
+  write("\xEF\xBB\xBFtime,offset_ns\r\n\xEF\xBB\xBFx\n");
+  EXPECT_EQ(lines(), (Lines{"time,offset_ns", "\xEF\xBB\xBFx"}));
+  write_gzip("\xEF\xBB\xBF\n1\n");
+  EXPECT_EQ(lines(), (Lines{"", "1"}));
+  write("\xEF\xBB");
+  EXPECT_EQ(lines(), (Lines{"\xEF\xBB"}));
+}
+
 TEST_F(LineReaderTest, reads_gzip_as_if_it_were_plain) {
   std::string content;
   for (int i = 0; i < 50000; ++i) content += std::to_string(i) + "\n";

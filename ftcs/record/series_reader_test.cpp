@@ -49,6 +49,14 @@ TEST_F(SeriesReader, takes_the_first_of_two_columns_for_time) {
   EXPECT_EQ(series->missing, 1U);
 }
 
+TEST_F(SeriesReader, finds_the_times_behind_a_byte_order_mark) {
+  const auto series = read("\xEF\xBB\xBFtime,offset_ns\n10,5\n12,-3\n14,4\n");
+  ASSERT_TRUE(series.ok()) << series.error().text();
+  EXPECT_EQ(series->kind, RecordKind::kOffset);
+  EXPECT_EQ(series->interval_s, 2.0);
+  EXPECT_NEAR(series->values[0], 5e-9, 1e-20);
+}
+
 TEST_F(SeriesReader, takes_a_record_in_hertz_with_its_nominal_frequency) {
   SeriesOptions options;
   options.unit = "Hz";
