@@ -128,6 +128,27 @@ TEST_F(RecordedLogTest, a_gzip_file_is_read_as_its_content) {
   EXPECT_EQ(log->pairs.size(), 3U);
 }
 
+TEST_F(RecordedLogTest, a_byte_order_mark_begins_a_table) {
+  const RecordedLog log = read("\xEF\xBB\xBFtime_s,offset_ns\n0,10\n1,20\n2,30\n");
+  EXPECT_EQ(log.pairs.size(), 3U);
+  EXPECT_EQ(log.unusable, 0U);
+}
+
+// Saturated, it would count as used and stand for 146 years.
+TEST_F(RecordedLogTest, a_line_with_a_number_that_does_not_fit_is_left_out) {
+  std::string text;
+  for (int i = 0; i < 6; ++i) {
+    text += fmt::format("ptp4l[{}.0]: master offset {} s2 freq +1 path delay 5\n", i,
+                        i == 3 ? "99999999999999999999999" : std::to_string(i));
+  }
+  const RecordedLog log = read(text);
+  EXPECT_EQ(log.used, 5U);
+  EXPECT_EQ(log.unusable, 1U);
+  ASSERT_EQ(log.examples.size(), 1U);
+  EXPECT_EQ(log.examples[0].number, 4U);
+  EXPECT_EQ(log.examples[0].text.rfind("a number that is too large for a clock", 0), 0U);
+}
+
 TEST_F(RecordedLogTest, empty_binary_and_foreign_files_are_one_clear_error) {
   for (const std::string& text :
        {std::string(), std::string("\0\1\2\3", 4), std::string("hello\nworld\n")}) {

@@ -59,6 +59,11 @@ std::optional<double> parse_decimal(std::string_view text) {
   return value;
 }
 
+bool fits_duration(double ns) {
+  constexpr double kLargest = 4.6e18;
+  return std::abs(ns) <= kLargest;
+}
+
 bool is_missing(std::string_view text) {
   const std::string lower = lower_case(text);
   return lower.empty() || lower == "-" || lower == "nan" || lower == "na" || lower == "null";

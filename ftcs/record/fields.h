@@ -25,6 +25,10 @@ namespace ftcs {
 /// of the locale.
 [[nodiscard]] std::optional<double> parse_decimal(std::string_view text);
 
+/// Nanoseconds of a record that a Duration holds, with room for sums: at most 4.6e18, 146 years,
+/// either way.
+[[nodiscard]] bool fits_duration(double ns);
+
 /// An empty field, "-", "nan", "na", "null": a value that is known to be missing. Case does not
 /// matter.
 [[nodiscard]] bool is_missing(std::string_view text);

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
@@ -138,11 +139,12 @@ class ChronyLog final : public LogFormat {
     if (fields.size() < layout_.columns) return std::nullopt;
     const auto time = parse_date(fields[0], fields[1]);
     const auto offset = parse_decimal(fields[layout_.offset]);
-    if (!time || !offset) return std::nullopt;
+    if (!time || !offset || !fits_duration(*offset * 1e9)) return std::nullopt;
     ChronyLine line{*time, layout_.offset_sign * *offset * 1e9, 0.0};
     if (!is(Kind::kTracking)) return line;
     const auto frequency = parse_decimal(fields[4]);
-    if (!frequency) return std::nullopt;
+    constexpr double kStandstillPpm = 1e6;
+    if (!frequency || std::abs(*frequency) > kStandstillPpm) return std::nullopt;
     line.frequency_ppm = *frequency;
     return line;
   }

@@ -2,7 +2,6 @@
 #include "ftcs/record/log_formats.h"
 
 #include <charconv>
-#include <cmath>
 
 #include "ftcs/record/fields.h"
 #include "ftcs/record/offset_log.h"
@@ -36,7 +35,7 @@ std::optional<Duration> parse_time(std::string_view text, std::int64_t unit_ns) 
   text = trimmed(text);
   if (text.find_first_of("eE") != std::string_view::npos) {
     const auto value = parse_decimal(text);
-    if (!value || std::abs(*value) * static_cast<double>(unit_ns) > 4.6e18) return std::nullopt;
+    if (!value || !fits_duration(*value * static_cast<double>(unit_ns))) return std::nullopt;
     return Duration::from_ns(*value * static_cast<double>(unit_ns));
   }
   const bool negative = !text.empty() && text.front() == '-';

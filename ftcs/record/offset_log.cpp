@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "ftcs/record/fields.h"
@@ -56,6 +57,15 @@ std::string clock_of(const std::vector<std::string_view>& words, std::size_t off
   return clock;
 }
 
+/// A clock that loses as much stands still.
+constexpr double kStandstillPpb = 1e9;
+constexpr const char* kDoesNotFit = "a number that is too large for a clock";
+
+bool fits(std::optional<double> time_s, double offset_ns, double frequency_ppb) {
+  return fits_duration(offset_ns) && fits_duration(time_s.value_or(0.0) * 1e9) &&
+         std::abs(frequency_ppb) <= kStandstillPpb;
+}
+
 }  // namespace
 
 std::optional<OffsetLogLine> parse_offset_log_line(std::string_view line) {
@@ -101,10 +111,16 @@ std::optional<SummaryLogLine> parse_summary_log_line(std::string_view line) {
 
 std::string OffsetLog::add(std::string_view line) {
   if (auto parsed = parse_offset_log_line(line)) {
+    if (!fits(parsed->time_s, parsed->offset_ns, parsed->frequency_ppb.value_or(0.0)))
+      return kDoesNotFit;
     source(parsed->source).lines.push_back(std::move(*parsed));
     return "";
   }
   if (auto parsed = parse_summary_log_line(line)) {
+    if (!fits(parsed->time_s, std::max(std::abs(parsed->rms_ns), std::abs(parsed->max_ns)),
+              parsed->frequency_ppb)) {
+      return kDoesNotFit;
+    }
     source(parsed->source).summaries.push_back(std::move(*parsed));
     return "";
   }

@@ -76,6 +76,20 @@ TEST(OffsetLog, prefers_offsets_to_summaries) {
   EXPECT_EQ(log.add("ptp4l[2.0]: port 1: MASTER to UNCALIBRATED"), "no offset in it");
 }
 
+TEST(OffsetLog, refuses_numbers_that_no_clock_has) {
+  OffsetLog log;
+  for (const char* text :
+       {"ptp4l[1.0]: master offset 99999999999999999999999 s2 freq +1 path delay 5",
+        "ptp4l[1.0]: master offset -4700000000000000000 s2 freq +1 path delay 5",
+        "ptp4l[1.0]: master offset 1 s2 freq +99999999999 path delay 5",
+        "ptp4l[99999999999.0]: master offset 1 s2 freq +1 path delay 5",
+        "ptp4l[1.0]: rms 1 max 99999999999999999999999 freq +1 +/- 3 delay 100 +/- 1"}) {
+    EXPECT_EQ(log.add(text), "a number that is too large for a clock") << text;
+  }
+  EXPECT_TRUE(log.sources().empty());
+  EXPECT_EQ(log.add("ptp4l[1.0]: master offset -4500000000000000000 s0 freq +1 path delay 5"), "");
+}
+
 TEST(OffsetLog, leaves_other_lines_alone) {
   for (const char* text : {"", "ptp4l[1.0]: port 1: MASTER to UNCALIBRATED",
                            "ptp4l[2.0]: rms 12 max 30 freq +5 +/- 3 delay 100 +/- 1", "offset",
