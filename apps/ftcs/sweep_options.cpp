@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include <CLI/CLI.hpp>
@@ -28,8 +29,7 @@ using experiment::Scenario;
 using experiment::SweepResult;
 
 /// "2/8": the second of eight parts.
-experiment::Shard parse_shard(const std::string& text) {
-  if (text.empty()) return {};
+std::optional<experiment::Shard> parse_shard(const std::string& text) {
   const auto slash = text.find('/');
   std::size_t index = 0;
   std::size_t count = 0;
@@ -38,10 +38,8 @@ experiment::Shard parse_shard(const std::string& text) {
   const bool read = slash != std::string::npos &&
                     std::from_chars(text.data(), middle, index).ptr == middle &&
                     std::from_chars(middle + 1, end, count).ptr == end;
-  if (!read || index < 1 || index > count) {
-    throw std::runtime_error(fmt::format("--shard needs i/n with 1 <= i <= n, got {}", text));
-  }
-  return {index - 1, count};
+  if (!read || index < 1 || index > count) return std::nullopt;
+  return experiment::Shard{index - 1, count};
 }
 
 /// A name that no scenario has is misspelt: it would leave tables without that row.
@@ -183,10 +181,15 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
   command.add_flag("--medians-only", options.medians_only,
                    "do not judge worst seeds and shares (for fresh seeds)");
   command.add_option("--threads", options.threads, "0 = one for each core");
-  command.add_option("--shard", options.shard, "i/n: compute one of n parts; needs --json");
+  auto* shard =
+      command.add_option("--shard", options.shard, "i/n: compute one of n parts; needs --json")
+          ->check([](const std::string& text) {
+            return parse_shard(text) ? "" : "expected i/n with 1 <= i <= n, got " + text;
+          });
   command.add_option("--merge", options.merge,
                      "join the --json files of all shards instead of computing");
-  command.add_option("--json", options.json, "write all figures to this file; - = standard output");
+  shard->needs(command.add_option("--json", options.json,
+                                  "write all figures to this file; - = standard output"));
   command.add_option("--csv", options.csv, "write the table to this file");
   command.add_option("--html", options.html, "write a report to this file");
   command.add_option("--trace", options.trace,
@@ -213,7 +216,7 @@ int run_and_report(std::vector<Scenario> scenarios, const SweepSource& source,
     throw std::runtime_error(
         fmt::format("--trace follows one scenario, {} were given", scenarios.size()));
   }
-  const experiment::Shard shard = parse_shard(options.shard);
+  const experiment::Shard shard = parse_shard(options.shard).value_or(experiment::Shard{});
   if (const int refused = check_sweep_results(options, source.files); refused != kSuccess)
     return refused;
   const platform::Interrupt interrupt;

@@ -51,7 +51,14 @@ expect 2 'binary.toml' simulate binary.toml
 expect 2 'a scenario needs a [run] table' simulate empty.toml
 expect 2 'none.toml: cannot be read' simulate none.toml
 expect 1 'no scenario files' compare --suite none
-expect 1 '--shard needs i/n' simulate good.toml --shard 3/2
+for shard in 3/2 0/2 1/0 1 /2 1/ 1/2/3 -1/2 one/two; do
+  expect 2 "simulate: --shard: expected i/n with 1 <= i <= n, got $shard" simulate good.toml --json part.json --shard=$shard
+done
+for command in 'simulate good.toml' 'compare good.toml' 'compare'; do
+  # shellcheck disable=SC2086
+  expect 2 '--shard requires --json' $command --shard 1/2
+done
+[ -e part.json ] && fail "a wrong shard began to run"
 expect 1 '--trace follows one scenario' simulate good.toml good.toml --trace t.csv
 expect 1 'not a result of --shard' simulate good.toml --merge good.toml
 expect 1 'none.log' compare --log none.log
