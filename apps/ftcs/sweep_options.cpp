@@ -117,6 +117,9 @@ std::size_t runs_in(const SweepResult& sweep) {
 void print(const std::vector<Scenario>& scenarios, const SweepResult& sweep) {
   for (std::size_t i = 0; i < scenarios.size(); ++i) {
     const Scenario& scenario = scenarios[i];
+    const auto& servos = sweep.scenarios[i].servos;
+    if (std::all_of(servos.begin(), servos.end(), [](const auto& row) { return row.runs.empty(); }))
+      continue;
     fmt::print(
         "{}: {}\n{} seeds from {} on, median over seeds; true time error over the measurement "
         "window\n\n{}\n",
@@ -231,8 +234,11 @@ int run_and_report(std::vector<Scenario> scenarios, const SweepSource& source,
     control.progress = [&](std::size_t done, std::size_t total) { progress.show(done, total); };
     sweep = experiment::run_sweep(scenarios, shard, control);
   }
-  if (interrupt.flag())
-    fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs\n");
+  if (interrupt.flag()) {
+    const std::string gaps = unjudged(sweep);
+    fmt::print(stderr, "ftcs: interrupted; the figures are of the finished runs{}{}\n",
+               gaps.empty() ? "" : "; ", gaps);
+  }
   if (!options.quiet) print(scenarios, sweep);
   say_doubts(own);
   // Also of a quiet run: a verdict without its reason helps nobody.

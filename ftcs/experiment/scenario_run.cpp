@@ -45,7 +45,7 @@ std::vector<Job> jobs_of(const std::vector<Scenario>& scenarios, const Shard& sh
 SweepResult empty_result(const std::vector<Scenario>& scenarios) {
   SweepResult result;
   for (const Scenario& scenario : scenarios) {
-    ScenarioResult entry{scenario.name, scenario.title, {}};
+    ScenarioResult entry{scenario.name, scenario.title, {}, scenario.seeds};
     for (const ScenarioServo& servo : scenario.servos) {
       entry.servos.emplace_back();
       entry.servos.back().servo = servo.name;

@@ -57,6 +57,12 @@ struct ScenarioResult {
   std::string scenario;
   std::string title;
   std::vector<ServoResult> servos;
+  std::uint64_t seeds = 0;  ///< runs of each servo when all have run
+
+  /// Have all runs of this servo been done? Of some of them a median says nothing yet.
+  [[nodiscard]] bool has_all_runs_of(const ServoResult& servo) const noexcept {
+    return servo.runs.size() >= seeds;
+  }
 };
 
 /// Which part of a sweep this process computes: the jobs whose number modulo `count` is `index`.

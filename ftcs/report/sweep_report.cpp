@@ -41,8 +41,17 @@ std::vector<const ServoResult*> ranked(const ScenarioResult& scenario) {
   return order;
 }
 
-std::string verdict(const ServoResult& servo) {
+/// A servo is judged once it and the bound, with which limits may compare it, have all their runs.
+bool is_judged(const ScenarioResult& scenario, const ServoResult& servo) {
+  const bool bound_is_there = std::all_of(
+      scenario.servos.begin(), scenario.servos.end(),
+      [&](const ServoResult& row) { return !is_bound(row) || scenario.has_all_runs_of(row); });
+  return bound_is_there && scenario.has_all_runs_of(servo);
+}
+
+std::string verdict(const ScenarioResult& scenario, const ServoResult& servo) {
   if (!servo.has_limits) return "";
+  if (!is_judged(scenario, servo)) return "not judged";
   if (servo.passed) return "ok";
   return servo.required ? "MISSED" : "missed (not required)";
 }
@@ -133,7 +142,7 @@ Table ranking_table(const ScenarioResult& scenario) {
                    cycles_cell(servo->median(&RunFigures::c5_cycles)),
                    Cell::significant(servo->median(&RunFigures::rms_first_ten_ns)),
                    Cell::significant(servo->median(&RunFigures::rate_error_ppb), 3),
-                   Cell::fixed(rms / bound, 2), verdict(*servo)});
+                   Cell::fixed(rms / bound, 2), verdict(scenario, *servo)});
   }
   return table;
 }
@@ -149,7 +158,8 @@ Table suite_table(const SweepResult& sweep) {
                      Cell::significant(servo->worst(&RunFigures::rms_time_error_ns)),
                      Cell::significant(limit_of(*servo, "rms_time_error", "worst"), 3),
                      Cell::significant(servo->median(&RunFigures::max_time_error_ns)),
-                     cycles_cell(servo->median(&RunFigures::c5_cycles)), verdict(*servo)});
+                     cycles_cell(servo->median(&RunFigures::c5_cycles)),
+                     verdict(scenario, *servo)});
     }
   }
   return table;
@@ -159,6 +169,7 @@ std::vector<std::string> missed_limits(const SweepResult& sweep) {
   std::vector<std::string> lines;
   for (const ScenarioResult& scenario : sweep.scenarios) {
     for (const ServoResult& servo : scenario.servos) {
+      if (!is_judged(scenario, servo)) continue;
       for (const auto& limit : servo.limits) {
         if (limit.passed) continue;
         lines.push_back(fmt::format("{}: {}: {} of {} is {}, limit {}{}", scenario.scenario,
@@ -169,6 +180,20 @@ std::vector<std::string> missed_limits(const SweepResult& sweep) {
     }
   }
   return lines;
+}
+
+std::string unjudged(const SweepResult& sweep) {
+  std::size_t cut_short = 0;
+  std::size_t not_run = 0;
+  for (const ScenarioResult& scenario : sweep.scenarios) {
+    const auto has_none = [](const ServoResult& servo) { return servo.runs.empty(); };
+    const auto has_all = [&](const ServoResult& servo) { return scenario.has_all_runs_of(servo); };
+    if (std::all_of(scenario.servos.begin(), scenario.servos.end(), has_all)) continue;
+    ++(std::all_of(scenario.servos.begin(), scenario.servos.end(), has_none) ? not_run : cut_short);
+  }
+  if (cut_short + not_run == 0) return "";
+  return fmt::format("of {} scenarios, cut short: {}, not run: {}; these are not judged",
+                     sweep.scenarios.size(), cut_short, not_run);
 }
 
 Json sweep_json(const SweepResult& sweep, const SweepOrigin& origin, bool with_runs) {
@@ -187,7 +212,7 @@ SweepResult sweep_from_json(const Json& json, const std::vector<experiment::Scen
   SweepResult result;
   std::size_t row = 0;
   for (const auto& scenario : scenarios) {
-    ScenarioResult entry{scenario.name, scenario.title, {}};
+    ScenarioResult entry{scenario.name, scenario.title, {}, scenario.seeds};
     for (const auto& servo : scenario.servos) {
       const Json& from = rows.at(row++);
       if (from.at("scenario") != scenario.name || from.at("servo") != servo.name) {
@@ -210,6 +235,8 @@ SweepResult sweep_from_json(const Json& json, const std::vector<experiment::Scen
 std::string sweep_html(const SweepResult& sweep, const SweepOrigin& origin,
                        const std::vector<experiment::RunTrace>& traces) {
   HtmlReport report("Clock servos compared", origin.suite);
+  if (const std::string gaps = unjudged(sweep); !gaps.empty())
+    report.add_note("Not complete: " + gaps, true);
   for (const std::string& line : missed_limits(sweep)) report.add_note(line, true);
   for (const ScenarioResult& scenario : sweep.scenarios) {
     report.add_table(scenario.scenario, ranking_table(scenario), scenario.title);

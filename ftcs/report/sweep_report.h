@@ -22,6 +22,10 @@ struct SweepOrigin {
 [[nodiscard]] Table suite_table(const experiment::SweepResult& sweep);
 /// Every missed limit in a sentence.
 [[nodiscard]] std::vector<std::string> missed_limits(const experiment::SweepResult& sweep);
+
+/// How many scenarios were cut short and how many did not run, whose limits are therefore not
+/// judged; empty: all ran to their end.
+[[nodiscard]] std::string unjudged(const experiment::SweepResult& sweep);
 /// `suite`: a list with one object for each scenario and servo. `runs_of` lists the figures of
 /// every single run (what a merge needs).
 [[nodiscard]] Json sweep_json(const experiment::SweepResult& sweep, const SweepOrigin& origin,

@@ -198,12 +198,27 @@ wait $program
 grep -q '"complete": false' interrupted.json || fail "an interrupted sweep says that it is incomplete"
 grep -q '"seed": 1,' interrupted.json || fail "an interrupted sweep keeps its runs"
 
+# What did not run to its end has missed nothing.
+printf '[[limit]]\nservo = "adaptive"\nrms_time_error = { median = "0.001 ns" }\n' > limit
+cat good.toml limit > done.toml
+cat long.toml limit > cut.toml
+"$ftcs" simulate done.toml cut.toml cut.toml good.toml > out 2> err &
+program=$!
+sleep 1
+kill -INT $program
+wait $program
+[ $? -eq 1 ] || fail "an interrupted suite must not succeed"
+grep -q 'interrupted; .*; of 4 scenarios, cut short: 1, not run: 2; these are not judged' err || fail "an interrupted suite: $(cat err)"
+[ "$(grep -c '^MISSED' err)" -eq 1 ] && grep -q '^MISSED done' err || fail "only the first scenario was judged: $(cat err)"
+[ "$(grep -c 'median over seeds' out)" -eq 2 ] || fail "a table of a scenario that did not run"
+
 "$ftcs" paper -q --seeds 100000 --json interrupted-paper.json > out 2> err &
 program=$!
 sleep 1
 kill -INT $program
 wait $program
 [ $? -eq 1 ] || fail "an interrupted paper must not succeed"
+[ "$(tail -n 1 out)" = "Interrupted: the demanded tolerances were not all judged." ] || fail "an interrupted paper says: $(cat out)"
 grep -q '"complete": false' interrupted-paper.json || fail "an interrupted paper says that it is incomplete"
 grep -q '"row": "FTCS1"' interrupted-paper.json || fail "an interrupted paper keeps its rows"
 
