@@ -12,6 +12,7 @@
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "ftcs/record/series_reader.h"
+#include "ftcs/record/units.h"
 #include "ftcs/report/record_report.h"
 
 namespace ftcs::app {
@@ -72,6 +73,23 @@ std::string read_deviations(const std::vector<std::string>& words, AnalysisOptio
   return "";
 }
 
+std::string check_time_unit(const std::string& text) {
+  return seconds_of_unit(text) ? "" : "expected one of s, ms, us, ns, ps, d, got " + text;
+}
+
+std::string check_unit(const std::string& text) {
+  if (seconds_of_unit(text) || fraction_of_unit(text) || hertz_of_unit(text)) return "";
+  return "expected one of s, ms, us, ns, ps, d, 1, ppm, ppb, ppt, Hz, kHz, MHz, GHz, got " + text;
+}
+
+/// Empty: a figure came of one of the averaging times that were asked for.
+std::string no_fitting_tau(const AnalyseOptions& options, const AnalysedRecord& record) {
+  if (options.analysis.taus_s.empty() || !stability_list(record).rows().empty()) return "";
+  const auto& series = record.series;
+  return fmt::format("{}: --taus {}: none fits the record of {} values, one in {:g} s",
+                     options.file, options.taus, series.values.size(), series.interval_s);
+}
+
 int analyse(AnalyseOptions options) {
   for (const std::string& wrong : {read_taus(options.taus, options.analysis),
                                    read_deviations(options.deviations, options.analysis)}) {
@@ -91,6 +109,10 @@ int analyse(AnalyseOptions options) {
     return kRuntimeError;
   }
   const AnalysedRecord record = analyse_series(options.file, std::move(*series), options.analysis);
+  if (const std::string wrong = no_fitting_tau(options, record); !wrong.empty()) {
+    fmt::print(stderr, "ftcs: {}\n", wrong);
+    return kRuntimeError;
+  }
   if (!options.quiet) fmt::print("{}", console_report(record));
   // Each is tried even if one before failed: a full disk must not cost the others.
   bool written = write_result(options.json, options.json.empty() ? "" : dump(json_report(record)));
@@ -116,15 +138,17 @@ void add_analyse_command(CLI::App& app, int& exit_code) {
   command->add_option("--column", options->series.column, "values: number from 1, or heading");
   command->add_option("--time-column", options->series.time_column,
                       "times: number, heading, or none");
-  command->add_option("--time-unit", options->series.time_unit,
-                      "s, ms, us, ns, ps, d (default: s)");
+  command->add_option("--time-unit", options->series.time_unit, "s, ms, us, ns, ps, d (default: s)")
+      ->check(check_time_unit);
   command
       ->add_option("--kind", options->kind, "what the values are (default: by heading, else phase)")
       ->check(CLI::IsMember({"phase", "frequency", "offset"}));
-  command->add_option(
-      "--unit", options->series.unit,
-      "s, ms, us, ns, ps; of frequency 1, ppm, ppb, ppt, or Hz, kHz, MHz, GHz with --nominal "
-      "(default: by heading and kind)");
+  command
+      ->add_option(
+          "--unit", options->series.unit,
+          "s, ms, us, ns, ps; of frequency 1, ppm, ppb, ppt, or Hz, kHz, MHz, GHz with --nominal "
+          "(default: by heading and kind)")
+      ->check(check_unit);
   command
       ->add_option("--nominal", options->series.nominal_hz,
                    "frequency in Hz that a record in Hz should have: 10e6")

@@ -74,6 +74,10 @@ TEST_F(AnalyseCommand, leaves_with_2_when_it_is_called_wrongly) {
   EXPECT_EQ(run({file("offsets.csv"), "--kind", "colour"}), kUsageError);
   EXPECT_EQ(run({file("offsets.csv"), "--interval", "-1"}), kUsageError);
   EXPECT_EQ(run({file("offsets.csv"), "--confidence", "1"}), kUsageError);
+  EXPECT_EQ(run({file("offsets.csv"), "--unit", "furlong"}), kUsageError);
+  EXPECT_EQ(run({file("offsets.csv"), "--time-unit", "h"}), kUsageError);
+  EXPECT_EQ(run({file("offsets.csv"), "--time-unit", "ppm"}), kUsageError);
+  EXPECT_EQ(run({file("offsets.csv"), "--time-unit", "d", "--unit", "us"}), kSuccess);
 }
 
 TEST_F(AnalyseCommand, computes_the_statistics_and_taus_that_it_is_asked_for) {
@@ -97,6 +101,15 @@ TEST_F(AnalyseCommand, computes_the_statistics_and_taus_that_it_is_asked_for) {
   EXPECT_EQ(run({file("phase.txt"), "--taus", "often"}), kUsageError);
   EXPECT_NE(errors_.find("got often"), std::string::npos);
   EXPECT_EQ(run({file("phase.txt"), "--taus", "-1"}), kUsageError);
+}
+
+TEST_F(AnalyseCommand, says_that_no_tau_fits_the_record) {
+  EXPECT_EQ(run({file("offsets.csv"), "--taus", "1e9,0.1", "--json", file("j")}), kRuntimeError);
+  EXPECT_EQ(errors_, "ftcs: " + file("offsets.csv") +
+                         ": --taus 1e9,0.1: none fits the record of 6 values, one in 1 s\n");
+  EXPECT_TRUE(output_.empty());
+  EXPECT_FALSE(std::filesystem::exists(file("j")));
+  EXPECT_EQ(run({file("offsets.csv"), "--taus", "1e9,1"}), kSuccess) << "one of them does";
 }
 
 TEST_F(AnalyseCommand, leaves_with_1_and_one_line_when_the_data_is_no_good) {
