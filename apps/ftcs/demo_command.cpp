@@ -8,9 +8,9 @@
 #include "apps/ftcs/commands.h"
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
-#include "apps/ftcs/units.h"
 #include "ftcs/fieldbus/demo_report.h"
 #include "ftcs/fieldbus/ptp_demo.h"
+#include "ftcs/record/quantity_text.h"
 
 namespace ftcs::app {
 namespace {

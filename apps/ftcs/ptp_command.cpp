@@ -11,12 +11,12 @@
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/ptp_option_table.h"
 #include "apps/ftcs/ptp_presets.h"
-#include "apps/ftcs/units.h"
 #include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/ptp_port.h"
 #include "ftcs/daemon/rights.h"
 #include "ftcs/platform/network_interface.h"
+#include "ftcs/record/quantity_text.h"
 
 namespace ftcs::app {
 namespace {

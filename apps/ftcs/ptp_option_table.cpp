@@ -12,7 +12,7 @@
 
 #include "apps/ftcs/ptp_fixed_settings.h"
 #include "apps/ftcs/steering_arguments.h"
-#include "apps/ftcs/units.h"
+#include "ftcs/record/quantity_text.h"
 #include "ftcs/report/suggestion.h"
 
 namespace ftcs::app {

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "apps/ftcs/units.h"
+#include "ftcs/record/quantity_text.h"
 
 namespace ftcs::app {
 namespace {

@@ -14,13 +14,13 @@
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/ptp_arguments.h"
 #include "apps/ftcs/rights.h"
-#include "apps/ftcs/units.h"
 #include "apps/ftcs/watch_arguments.h"
 #include "ftcs/daemon/exit_code.h"
 #include "ftcs/fieldbus/cycle_laws.h"
 #include "ftcs/fieldbus/ethercat_run.h"
 #include "ftcs/fieldbus/rights.h"
 #include "ftcs/fieldbus/run_status.h"
+#include "ftcs/record/quantity_text.h"
 
 namespace ftcs::app {
 namespace {

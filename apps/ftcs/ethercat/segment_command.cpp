@@ -9,10 +9,10 @@
 #include "apps/ftcs/number_check.h"
 #include "apps/ftcs/output.h"
 #include "apps/ftcs/rights.h"
-#include "apps/ftcs/units.h"
 #include "ftcs/fieldbus/rights.h"
 #include "ftcs/fieldbus/segment_server.h"
 #include "ftcs/platform/stop_flag.h"
+#include "ftcs/record/quantity_text.h"
 
 namespace ftcs::app {
 

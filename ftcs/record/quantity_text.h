@@ -10,7 +10,7 @@
 #include "ftcs/time/rate.h"
 #include "ftcs/time/result.h"
 
-namespace ftcs::app {
+namespace ftcs {
 
 /// One sentence: what was expected and what was given.
 struct ParseError {
@@ -31,4 +31,4 @@ struct ParseError {
                                                              std::int64_t lowest,
                                                              std::int64_t highest);
 
-}  // namespace ftcs::app
+}  // namespace ftcs

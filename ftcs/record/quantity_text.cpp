@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "apps/ftcs/units.h"
+#include "ftcs/record/quantity_text.h"
 
 #include <array>
 #include <charconv>
@@ -8,7 +8,7 @@
 
 #include <fmt/core.h>
 
-namespace ftcs::app {
+namespace ftcs {
 namespace {
 
 struct Unit {
@@ -106,4 +106,4 @@ Result<std::int64_t, ParseError> parse_integer(std::string_view text, std::int64
   return ParseError{fmt::format("'{}': expected an integer from {} to {}", text, lowest, highest)};
 }
 
-}  // namespace ftcs::app
+}  // namespace ftcs

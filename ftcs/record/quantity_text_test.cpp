@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // World: what people type.
-#include "apps/ftcs/units.h"
+#include "ftcs/record/quantity_text.h"
 
 #include <gtest/gtest.h>
 
-namespace ftcs::app {
+namespace ftcs {
 namespace {
 
 TEST(Units, durations_carry_their_unit) {
@@ -53,4 +53,4 @@ TEST(Units, numbers_keep_within_their_range) {
 }
 
 }  // namespace
-}  // namespace ftcs::app
+}  // namespace ftcs
