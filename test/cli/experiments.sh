@@ -79,6 +79,7 @@ for name in record.csv ./record.csv "$folder/record.csv" record.link record.hard
   done
 done
 expect 2 '--trace record.csv would overwrite what is read' compare --log record.csv --trace record.csv
+# shellcheck disable=SC2094
 expect 2 '--csv record.csv would overwrite what is read: FILE - is the same file' analyse - --csv record.csv < record.csv
 expect 2 '--csv ./same would overwrite another result: --json same is the same file' analyse record.csv --json same --csv ./same
 expect 2 '--html same would overwrite another result: --csv same' compare good.toml --csv same --html same
