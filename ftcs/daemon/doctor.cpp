@@ -164,9 +164,10 @@ diagnosis::Finding failure(std::string text, std::string remedy = {}) {
   return {diagnosis::Cause::kOther, std::move(text), "", std::move(remedy)};
 }
 
-bool is_link_up(platform::Kernel& kernel, const std::string& interface) {
+/// Nothing to listen to; the port itself may have been up a moment ago.
+bool has_carrier(platform::Kernel& kernel, const std::string& interface) {
   const auto state = platform::interface_state(kernel, interface);
-  return !state || (state->up && state->running);
+  return !state || !state->up || state->running;
 }
 
 std::int64_t utc_s(platform::Kernel& kernel) {
@@ -257,7 +258,9 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
                             const ClockWatch* clock, const PtpOptions& options) {
   diagnosis::PortSeen seen = port.seen();
   seen.on_wire = wire.finish();
-  seen.link_up = is_link_up(kernel, options.interface);
+  if (seen.link == diagnosis::Link::kUp && !has_carrier(kernel, options.interface)) {
+    seen.link = diagnosis::Link::kNoCarrier;
+  }
   seen.utc_s = utc_s(kernel);
   if (clock != nullptr) {
     seen.foreign_changes = clock->changes();
@@ -306,7 +309,7 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   result.wire_unheard = wire.error();
   const diagnosis::Talkers& talkers = seen.on_wire ? *seen.on_wire : seen.at_port;
   result.heard.assign(talkers.all().begin(), talkers.all().end());
-  if (port.failure() && seen.link_up) result.findings.push_back(failure(*port.failure()));
+  if (port.failure()) result.findings.push_back(failure(*port.failure()));
   const auto comparison =
       compare_with_another(kernel, options, log, identity->clock, port, talkers);
   if (comparison && comparison->in_doubt) result.findings.push_back(*comparison);

@@ -52,6 +52,33 @@ diagnosis::PortSettings port_settings(const PtpOptions& options) {
   return settings;
 }
 
+diagnosis::PortSeen seen_of_link(const PtpOptions& options,
+                                 const platform::PtpTransport& transport) {
+  using diagnosis::Link;
+  diagnosis::PortSeen seen;
+  seen.settings = port_settings(options);
+  const auto& closed = transport.closed();
+  if (!closed) {
+    seen.link = transport.is_up() ? Link::kUp : Link::kNoCarrier;
+    return seen;
+  }
+  switch (closed->kind) {
+    case platform::OsErrorKind::kInterfaceDown:
+      seen.link = Link::kDown;
+      break;
+    case platform::OsErrorKind::kNoSuchInterface:
+      seen.link = Link::kGone;
+      break;
+    case platform::OsErrorKind::kNoAddress:
+      seen.link = Link::kNoAddress;
+      break;
+    default:
+      seen.link = Link::kClosed;
+      seen.closed = closed->message();
+  }
+  return seen;
+}
+
 PortObserver::PortObserver(const PtpOptions& options, const ptp::ClockIdentity& own,
                            FreeRunningTime start)
     : settings_(port_settings(options)),

@@ -7,6 +7,7 @@
 #include "ftcs/daemon/ptp_options.h"
 #include "ftcs/diagnosis/port_diagnosis.h"
 #include "ftcs/discipline/telemetry.h"
+#include "ftcs/platform/ptp_transport.h"
 #include "ftcs/ptp/counters.h"
 #include "ftcs/time/instant.h"
 
@@ -49,5 +50,8 @@ class PortObserver {
 
 /// What is to be heard, as the options say.
 [[nodiscard]] diagnosis::PortSettings port_settings(const PtpOptions& options);
+/// The settings and the link of a port, and nothing else.
+[[nodiscard]] diagnosis::PortSeen seen_of_link(const PtpOptions& options,
+                                               const platform::PtpTransport& transport);
 
 }  // namespace ftcs::daemon

@@ -66,7 +66,7 @@ int PtpPort::run(const std::function<bool()>& stop) {
   }
   report_stamps();
   if (real_clock_ != nullptr) transport_.watch(real_clock_->wake_descriptor());
-  start(now());
+  start_port();
   std::optional<FreeRunningTime> end;
   if (options_.duration) end = now() + *options_.duration;
   while (!stop() && !failure_ && !(end && now() >= *end)) turn(end);
@@ -80,6 +80,13 @@ int PtpPort::run(const std::function<bool()>& stop) {
     return kRuntimeError;
   }
   return finish();
+}
+
+// An interface that was down before the start is down for the core from its first state on.
+void PtpPort::start_port() {
+  start(now());
+  started_ = true;
+  if (transport_.closed()) on_link_change(false, now());
 }
 
 void PtpPort::turn(std::optional<FreeRunningTime> end) {
@@ -301,9 +308,11 @@ void PtpPort::on_transmitted(const platform::TransmittedMessage& message) {
 }
 
 void PtpPort::on_link(bool up, const std::string& reason) {
-  log_(LogLevel::kNotice, "port 1 ({}): link {}{}{}", options_.interface, up ? "up" : "down",
-       reason.empty() ? "" : ": ", reason);
-  on_link_change(up, now());
+  const auto trouble = up ? std::nullopt : diagnosis::link_trouble(seen_of_link());
+  const std::string remedy = trouble ? trouble->remedy : "";
+  log_(LogLevel::kNotice, "port 1 ({}): link {}{}{}{}{}", options_.interface, up ? "up" : "down",
+       reason.empty() ? "" : ": ", reason, remedy.empty() ? "" : "; ", remedy);
+  if (started_) on_link_change(up, now());
 }
 
 void PtpPort::on_readable(int descriptor) {

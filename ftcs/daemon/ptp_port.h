@@ -17,6 +17,7 @@
 #include "ftcs/daemon/log.h"
 #include "ftcs/daemon/management_server.h"
 #include "ftcs/daemon/port_data_sets.h"
+#include "ftcs/daemon/port_observer.h"
 #include "ftcs/daemon/ptp_clock.h"
 #include "ftcs/daemon/ptp_options.h"
 #include "ftcs/daemon/real_clock.h"
@@ -67,7 +68,9 @@ class PtpPort : private platform::TransportHandler {
   [[nodiscard]] virtual std::optional<FreeRunningTime> deadline() const = 0;
   /// Opens where timestamps come from, and waits for them; the network's sockets, unless a port has
   /// none. `underlying`: on the oscillator without skew.
-  [[nodiscard]] virtual std::optional<platform::OsError> open_source() { return transport_.open(); }
+  [[nodiscard]] virtual std::optional<platform::OsError> open_source() {
+    return transport_.open_or_wait();
+  }
   virtual void wait_until(FreeRunningTime underlying);
   /// Who answers the management socket; null: nobody, and there is none.
   [[nodiscard]] virtual Managed* managed() { return nullptr; }
@@ -94,6 +97,10 @@ class PtpPort : private platform::TransportHandler {
   void fail(const std::string& reason);
   [[nodiscard]] bool has_failed() const { return failure_.has_value(); }
   [[nodiscard]] FreeRunningTime now() { return oscillator_.now(); }
+  /// The settings and the link of the port, and nothing else.
+  [[nodiscard]] diagnosis::PortSeen seen_of_link() const {
+    return daemon::seen_of_link(options_, transport_);
+  }
   /// To the page of ftcs_now.h, if one was asked for.
   void publish_time(const TimeBound& bound);
   [[nodiscard]] SkewedSource& oscillator() { return oscillator_; }
@@ -142,6 +149,7 @@ class PtpPort : private platform::TransportHandler {
   bool open_time_page();
   [[nodiscard]] bool open_watch();
   void report_stamps();
+  void start_port();
   void turn(std::optional<FreeRunningTime> end);
 
   platform::Kernel& kernel_;
@@ -159,6 +167,7 @@ class PtpPort : private platform::TransportHandler {
   platform::SocketAddress sender_{};  ///< of the message that is being handled
   platform::SocketAddress transmitter_{};
   std::optional<platform::StampSource> reported_stamps_{};
+  bool started_ = false;
   bool stamp_missed_ = false;
   bool send_failed_ = false;
   std::vector<ptp::EventId> unsent_{};  ///< event messages that the network did not take

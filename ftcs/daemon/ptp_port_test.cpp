@@ -76,6 +76,43 @@ TEST(PtpPort, transmit_stamps_that_take_longer_than_their_timeout_measure_the_pa
   EXPECT_EQ(link.said.find("no path delay"), std::string::npos) << link.said;
 }
 
+// A cable or DHCP that is late at boot: nobody starts the service again.
+TEST(PtpPort, waits_for_a_late_interface_says_why_and_locks) {
+  for (const bool is_up : {false, true}) {
+    Link link;
+    link.kernel.interface_has_address = false;
+    if (!is_up) link.kernel.interface_flags = 0;
+    link.kernel.on_second = [&] {
+      if (link.kernel.ideal_ns < 20 * kSecond) return;
+      link.kernel.interface_flags = IFF_UP | IFF_RUNNING;
+      link.kernel.interface_has_address = true;
+    };
+    EXPECT_EQ(link.run(), kSuccess) << link.said;
+    const char* const why = is_up ? "; ip address add ADDRESS/24 dev eth0 or DHCP; or -2 for "
+                                    "Ethernet, -6 for IPv6"
+                                  : "the interface is down; ip link set eth0 up";
+    EXPECT_NE(link.said.find(why), std::string::npos) << link.said;
+    EXPECT_EQ(occurrences(link.said, "link down: "), 1U) << link.said;
+    EXPECT_EQ(occurrences(link.said, "LISTENING to FAULTY"), 1U) << link.said;
+    EXPECT_EQ(occurrences(link.said, "FAULTY to LISTENING"), 1U) << link.said;
+  }
+}
+
+TEST(PtpPort, an_interface_that_stays_down_is_the_reason_at_the_end) {
+  for (const Role role : {Role::kTimeReceiver, Role::kTimeTransmitter}) {
+    Link link;
+    link.kernel.interface_flags = 0;
+    link.options.role = role;
+    link.options.duration = Duration::from_ns(10 * kSecond);
+    EXPECT_EQ(link.run(), kNotLocked) << link.said;
+    EXPECT_NE(link.said.find("the interface is down; ip link set eth0 up"), std::string::npos);
+    if (role == Role::kTimeReceiver) {
+      EXPECT_NE(link.said.find("not locked: eth0 is down; expected "), std::string::npos)
+          << link.said;
+    }
+  }
+}
+
 TEST(PtpPort, a_reference_that_jumps_is_followed_or_refused_as_at_the_start_and_it_says_so) {
   struct Case {
     double jump_ns;

@@ -179,7 +179,9 @@ PortTotals PtpReceiver::totals() {
 
 diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
   diagnosis::PortSeen seen = observer_.seen(now, totals());
-  seen.link_up = transport().is_up();
+  const diagnosis::PortSeen link = seen_of_link();
+  seen.link = link.link;
+  seen.closed = link.closed;
   seen.has_transmitter = node_.port().transmitter() != nullptr;
   seen.peer_delay = node_.port().peer_delay().mean_link_delay();
   seen.locked = node_.locked();

@@ -66,7 +66,7 @@ ptp::ManagedPort PtpTransmitter::managed_port() { return data_sets(options(), fa
 
 std::string PtpTransmitter::status(const ptp::ManagementCounters& management) {
   const StatusOfPort port{options(), facts_, seconds_since_start(), management};
-  return transmitter_status(port, core());
+  return transmitter_status(port, core(), diagnosis::link_trouble(seen_of_link()));
 }
 
 }  // namespace ftcs::daemon

@@ -263,6 +263,8 @@ std::string text_of(const Json& status) {
              fmt::format("{}, grandmaster {}", word(status, "transmitter"),
                          word(status, "grandmaster")));
     add_follower_lines(text, status);
+  } else {
+    add_sentence(text, status);
   }
   add_line(text, "messages", counts(status, "messages"));
   add_line(text, "uptime", fmt::format("{:.1f} s", figure(status, "uptime_s")));
@@ -312,8 +314,15 @@ std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& s
   return dump(status);
 }
 
-std::string transmitter_status(const StatusOfPort& port, const ptp::TimeTransmitter& core) {
-  return dump(common(port, core.state(), core.counters()));
+std::string transmitter_status(const StatusOfPort& port, const ptp::TimeTransmitter& core,
+                               const std::optional<diagnosis::Finding>& trouble) {
+  Json status = common(port, core.state(), core.counters());
+  if (trouble) {
+    status["diagnosis"] = to_json(*trouble);
+    status["diagnosis"]["sentence"] =
+        fmt::format("not transmitting: {}; {}", trouble->seen, trouble->remedy);
+  }
+  return dump(status);
 }
 
 std::optional<StatusForPeople> read_status(std::string_view json) {

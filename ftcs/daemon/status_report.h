@@ -28,8 +28,10 @@ struct StatusOfPort {
 [[nodiscard]] std::string receiver_status(const StatusOfPort& port, const ptp::TimeReceiver& core,
                                           const FollowerRecord& record,
                                           const diagnosis::PortSeen& seen, FreeRunningTime now);
+/// `trouble`: why it does not transmit.
 [[nodiscard]] std::string transmitter_status(const StatusOfPort& port,
-                                             const ptp::TimeTransmitter& core);
+                                             const ptp::TimeTransmitter& core,
+                                             const std::optional<diagnosis::Finding>& trouble);
 
 [[nodiscard]] std::string monitor_status(const StatusOfPort& port, const ptp::MonitorSource& source,
                                          ptp::PortState state, const FollowerRecord& record,

@@ -10,6 +10,7 @@ std::string_view name(Cause cause) noexcept {
       "locked",
       "acquiring",
       "link_down",
+      "no_address",
       "vlan",
       "transport",
       "group",

@@ -14,6 +14,7 @@ enum class Cause : std::uint8_t {
   kAcquiring,  ///< all is there, the servo is on its way
   // Of a PTP port: nothing to follow.
   kLinkDown,
+  kNoAddress,     ///< the interface has no IP address to send from
   kVlan,          ///< PTP is heard in a VLAN alone
   kTransport,     ///< over another transport alone
   kGroup,         ///< L2: to another group address

@@ -25,11 +25,42 @@ Finding acquiring(const PortSeen& seen) {
 
 }  // namespace
 
+std::optional<Finding> link_trouble(const PortSeen& seen) {
+  const std::string& interface = seen.settings.interface;
+  const char* const version = seen.settings.way == Way::kUdpIpv6 ? "IPv6" : "IPv4";
+  switch (seen.link) {
+    case Link::kUp:
+      return std::nullopt;
+    case Link::kNoCarrier:
+      return Finding{Cause::kLinkDown, fmt::format("the link of {} is down: no carrier", interface),
+                     "a cable, and a device that is on at its other end",
+                     "the cable, the switch's port"};
+    case Link::kDown:
+      return Finding{Cause::kLinkDown, fmt::format("{} is down", interface),
+                     "a cable, and the interface up", fmt::format("ip link set {} up", interface)};
+    case Link::kGone:
+      return Finding{Cause::kLinkDown, fmt::format("{} is not there any more", interface),
+                     "the interface", "plug it in again"};
+    case Link::kNoAddress:
+      return Finding{
+          Cause::kNoAddress, fmt::format("{} has no {} address", interface, version),
+          fmt::format("one, as {} is spoken", name(seen.settings.way)),
+          fmt::format("ip address add ADDRESS/24 dev {} or DHCP; or -2 for Ethernet, {}", interface,
+                      seen.settings.way == Way::kUdpIpv6 ? "-4 for IPv4" : "-6 for IPv6")};
+    case Link::kClosed:
+      break;
+  }
+  return Finding{Cause::kOther, seen.closed, "sockets that can be opened", ""};
+}
+
 std::vector<Finding> diagnose_all(const PortSeen& seen) {
   std::vector<Finding> all;
   const auto add = [&all](std::vector<Finding> more) {
     for (Finding& finding : more) all.push_back(std::move(finding));
   };
+  if (!seen.locked) {
+    if (auto found = link_trouble(seen)) all.push_back(std::move(*found));
+  }
   if (auto found = other_group(seen)) all.push_back(std::move(*found));
   // A real clock does not follow what a virtual one may.
   if (seen.steers_real_clock) add(refusals_of_time(seen));

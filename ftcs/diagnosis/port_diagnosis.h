@@ -15,6 +15,16 @@
 
 namespace ftcs::diagnosis {
 
+/// What the interface lets a port do.
+enum class Link : std::uint8_t {
+  kUp,
+  kNoCarrier,
+  kDown,       ///< administratively
+  kGone,       ///< unplugged, removed
+  kNoAddress,  ///< none of the IP version that is spoken
+  kClosed,     ///< the sockets cannot be opened, for another reason
+};
+
 /// What a PTP time receiver was told to listen to.
 struct PortSettings {
   std::string interface;
@@ -34,7 +44,8 @@ struct PortSettings {
 struct PortSeen {
   PortSettings settings{};
   double seconds = 0.0;
-  bool link_up = true;
+  Link link = Link::kUp;
+  std::string closed{};          ///< Link::kClosed: the reason
   bool has_transmitter = false;  ///< one is selected
   ptp::Counters counters{};
   Talkers at_port{};                 ///< by our own sockets
@@ -57,6 +68,8 @@ struct PortSeen {
   std::string refusal{};                ///< why the reference's time is not believed; empty: it is
 };
 
+/// What is wrong with the link, for receivers and transmitters alike; none: it is up.
+[[nodiscard]] std::optional<Finding> link_trouble(const PortSeen& seen);
 /// The first thing that stands between the port and its lock, in the order in which things must be
 /// there: link, messages, measurement, belief, servo. kLocked: nothing does.
 [[nodiscard]] Finding diagnose(const PortSeen& seen);

@@ -73,7 +73,21 @@ std::vector<Case> heard() {
   };
   return {
       {Cause::kNoAnnounce, fresh(), "ftcs doctor -i eth0"},
-      {Cause::kLinkDown, with(fresh(), [](PortSeen& s) { s.link_up = false; }), "ip link set eth0"},
+      {Cause::kLinkDown, with(fresh(), [](PortSeen& s) { s.link = Link::kDown; }),
+       "ip link set eth0"},
+      {Cause::kLinkDown, with(fresh(), [](PortSeen& s) { s.link = Link::kNoCarrier; }),
+       "the cable"},
+      {Cause::kLinkDown, with(fresh(), [](PortSeen& s) { s.link = Link::kGone; }), "plug it in"},
+      {Cause::kNoAddress, with(fresh(), [](PortSeen& s) { s.link = Link::kNoAddress; }),
+       "eth0 has no IPv4 address; expected one, as UDPv4 is spoken; ip address add ADDRESS/24 dev "
+       "eth0 or DHCP; or -2 for Ethernet, -6 for IPv6"},
+      {Cause::kOther,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.link = Link::kClosed;
+              s.closed = "UDP port 319: in use";
+            }),
+       "UDP port 319: in use"},
       {Cause::kDomain, with(fresh(), say({.domain = 5})), "--domainNumber 5"},
       {Cause::kSdo, with(fresh(), say({.sdo = 1})), "--preset gptp"},
       {Cause::kSdo, with(fresh(), say({.sdo = 3})), "--transportSpecific 3"},
@@ -148,7 +162,8 @@ std::vector<Case> measured() {
   };
   return {
       {Cause::kAcquiring, followed(), "the path delay is not known yet"},
-      {Cause::kLinkDown, with(followed(), [](PortSeen& s) { s.link_up = false; }), "eth0 is down"},
+      {Cause::kLinkDown, with(followed(), [](PortSeen& s) { s.link = Link::kDown; }),
+       "eth0 is down"},
       {Cause::kNoSync, with(followed(), [](PortSeen& s) { s.counters = {}; }), "port 319"},
       {Cause::kNoFollowUp,
        with(followed(),

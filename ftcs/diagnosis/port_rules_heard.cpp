@@ -35,13 +35,6 @@ bool same_way(const Talker& talker, const PortSettings& settings) {
   return talker.way == settings.way && talker.vlan == 0;
 }
 
-Found link_down(const PortSeen& seen) {
-  if (seen.link_up) return std::nullopt;
-  return Finding{Cause::kLinkDown, fmt::format("the link of {} is down", seen.settings.interface),
-                 "a cable, and the interface up",
-                 fmt::format("ip link set {} up", seen.settings.interface)};
-}
-
 Found not_acceptable(const PortSeen& seen) {
   const std::uint64_t count = seen.counters[Counter::kUnacceptableTransmitter];
   if (count == 0) return std::nullopt;
@@ -198,7 +191,7 @@ Found transport(const PortSeen& seen) {
 }
 
 Found not_delivered(const PortSeen& seen) {
-  if (!seen.on_wire) return std::nullopt;
+  if (!seen.on_wire || seen.link != Link::kUp) return std::nullopt;
   const auto ours = [&](const Talker& talker) {
     return is_for(talker, seen.settings) && talker.announces();
   };
@@ -278,23 +271,11 @@ bool is_for(const Talker& talker, const PortSettings& settings) noexcept {
 }
 
 std::span<const PortRule> rules_of_hearing() noexcept {
-  static constexpr std::array<PortRule, 16> kRules{
-      link_down,
-      not_acceptable,
-      not_authentic,
-      not_capable,
-      unusable_announce,
-      alternate,
-      unicast,
-      not_delivered,
-      sync_without_announce,
-      domain,
-      sdo,
-      transport,
-      vlan,
-      version,
-      malformed,
-      only_receivers,
+  static constexpr std::array<PortRule, 15> kRules{
+      not_acceptable, not_authentic, not_capable,    unusable_announce,
+      alternate,      unicast,       not_delivered,  sync_without_announce,
+      domain,         sdo,           transport,      vlan,
+      version,        malformed,     only_receivers,
   };
   return kRules;
 }

@@ -26,8 +26,6 @@ std::string who(const PortSeen& seen) {
                         : fmt::format("the transmitter {}", to_text(one->port).view());
 }
 
-Found link_down(const PortSeen& seen) { return rules_of_hearing().front()(seen); }
-
 Found no_receive_stamps(const PortSeen& seen) {
   if (seen.receive_stamps_missing == 0 || seen.counters[Counter::kForwardPairs] > 0) {
     return std::nullopt;
@@ -221,10 +219,9 @@ std::optional<Finding> no_peer(const PortSeen& seen) {
 }
 
 std::span<const PortRule> rules_of_measuring() noexcept {
-  static constexpr std::array<PortRule, 13> kRules{
-      link_down,    no_receive_stamps, no_sync,         no_follow_up,       two_transmitters,
-      one_identity, timescale,         no_peer,         no_transmit_stamps, no_delay_answer,
-      first_offset, other_steers,      samples_refused,
+  static constexpr std::array<PortRule, 12> kRules{
+      no_receive_stamps,  no_sync,         no_follow_up, two_transmitters, one_identity,  timescale, no_peer,
+      no_transmit_stamps, no_delay_answer, first_offset, other_steers,     samples_refused,
   };
   return kRules;
 }

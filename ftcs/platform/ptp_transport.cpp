@@ -23,6 +23,11 @@ int poll_timeout_ms(Duration wait) {
   return static_cast<int>((wait.floor_ns() + kNsPerMs - 1) / kNsPerMs);
 }
 
+/// Somebody plugs it in, sets it up or gives it an address: soon after, it is used.
+bool is_awaited(const OsError& error) {
+  return error.kind == OsErrorKind::kInterfaceDown || error.kind == OsErrorKind::kNoAddress;
+}
+
 }  // namespace
 
 PtpTransport::PtpTransport(Kernel& kernel, PtpSocketConfig config, TimestampClock& clock,
@@ -33,12 +38,36 @@ std::optional<OsError> PtpTransport::open() {
   auto opened = PtpSocket::open(kernel_, config_, clock_);
   if (!opened) return opened.error();
   socket_.emplace(std::move(*opened));
+  closed_.reset();
   carrier_is_reported_ = socket_->interface().running;
   carrier_ = true;
   suspect_ = false;
   reopen_delay_ = kFirstReopenDelay;
   next_check_ = clock_.source().now() + kLinkInterval;
   return std::nullopt;
+}
+
+std::optional<OsError> PtpTransport::open_or_wait() {
+  auto error = open();
+  if (!error || !is_awaited(*error)) return error;
+  stamp_in_hardware();
+  closed_ = std::move(error);
+  reopen_delay_ = kFirstReopenDelay;
+  next_check_ = clock_.source().now() + reopen_delay_;
+  handler_.on_link(false, closed_->message());
+  return std::nullopt;
+}
+
+// While there is the right to: the sockets may be opened without it. Where it fails, they say so.
+void PtpTransport::stamp_in_hardware() {
+  if (!clock_.is_hardware()) return;
+  const int fd = kernel_.socket(AF_INET, SOCK_DGRAM);
+  if (fd < 0) return;
+  const Descriptor closes(kernel_, fd);
+  if (const auto adapter = interface_capabilities(kernel_, fd, config_.interface)) {
+    (void)enable_hardware_timestamps(kernel_, fd, config_.interface, *adapter,
+                                     config_.transport == NetworkTransport::kEthernet);
+  }
 }
 
 std::optional<OsError> PtpTransport::send(Channel channel, std::span<const std::uint8_t> bytes,
@@ -117,37 +146,43 @@ void PtpTransport::check_link(FreeRunningTime now) {
   if (!socket_) return try_to_reopen(now);
   const auto state =
       interface_state(kernel_, socket_->descriptor(Channel::kGeneral), config_.interface);
-  if (!state) return lose(state.error().message());
-  if (!state->up) return lose(os_error(ENETDOWN, "interface " + config_.interface).message());
+  const std::string interface = "interface " + config_.interface;
+  if (!state) return lose(state.error());
+  if (!state->up) return lose(os_error(ENETDOWN, interface));
   if (state->index != socket_->interface().index) {
-    return lose("interface " + config_.interface + ": was replaced");
+    return lose(os_error(ENODEV, interface), interface + ": was replaced");
   }
   if (config_.transport == NetworkTransport::kUdpIpv4) {
     const int descriptor = socket_->descriptor(Channel::kGeneral);
     // Syncs would come on, but no answer: it is said, and open() waits for the address.
     if (const auto none = missing_ipv4_address(kernel_, descriptor, config_.interface)) {
-      return lose(none->message());
+      return lose(*none);
     }
   }
   carrier_is_reported_ = carrier_is_reported_ || state->running;
   const bool carrier = state->running || !carrier_is_reported_;
   if (carrier == carrier_) return;
   carrier_ = carrier;
-  handler_.on_link(carrier, carrier ? "" : "interface " + config_.interface + ": no carrier");
+  handler_.on_link(carrier, carrier ? "" : interface + ": no carrier");
 }
 
-void PtpTransport::lose(const std::string& reason) {
+void PtpTransport::lose(const OsError& error, const std::string& reason) {
   const bool was_up = is_up();
   socket_.reset();
+  closed_ = error;
   next_check_ = clock_.source().now() + reopen_delay_;
   if (was_up) handler_.on_link(false, reason);
 }
 
 void PtpTransport::try_to_reopen(FreeRunningTime now) {
   const Duration delay = std::min(reopen_delay_ + reopen_delay_, kLongestReopenDelay);
-  if (open()) {
+  const std::string known = closed_ ? closed_->message() : "";
+  if (auto error = open()) {
     reopen_delay_ = delay;
-    next_check_ = now + delay;
+    next_check_ = now + (is_awaited(*error) ? std::min(delay, kLinkInterval) : delay);
+    const bool is_news = error->message() != known;
+    closed_ = std::move(error);
+    if (is_news) handler_.on_link(false, closed_->message());
     return;
   }
   handler_.on_link(true, "");

@@ -22,7 +22,7 @@ class TransportHandler {
   virtual void on_message(const ReceivedMessage& message) = 0;
   /// The timestamp of an event message that was sent, or its absence.
   virtual void on_transmitted(const TransmittedMessage& message) = 0;
-  /// The link went up or down; `reason` is empty when it came up.
+  /// The link went up or down; `reason` is empty when it came up. Down again: for another reason.
   virtual void on_link(bool up, const std::string& reason) = 0;
   /// A descriptor given to PtpTransport::watch() can be read.
   virtual void on_readable(int) {}
@@ -44,6 +44,9 @@ class PtpTransport {
 
   /// The first opening, whose error is the user's to repair.
   [[nodiscard]] std::optional<OsError> open();
+  /// As open(), but an interface that is down or has no address yet is no error: the handler hears
+  /// of it, and it is waited for as one that was lost.
+  [[nodiscard]] std::optional<OsError> open_or_wait();
   /// An error is also noted for the link's sake: the caller need not act on it.
   std::optional<OsError> send(Channel channel, std::span<const std::uint8_t> bytes,
                               Group group = Group::kPrimary);
@@ -66,6 +69,8 @@ class PtpTransport {
   static constexpr std::size_t kLargestWatch = 4;
 
   [[nodiscard]] bool is_up() const noexcept { return socket_.has_value() && carrier_; }
+  /// Why there are no sockets; none: there are, or open() was not called.
+  [[nodiscard]] const std::optional<OsError>& closed() const noexcept { return closed_; }
   /// No value while the link is down.
   [[nodiscard]] const PtpSocket* socket() const noexcept { return socket_ ? &*socket_ : nullptr; }
 
@@ -76,13 +81,16 @@ class PtpTransport {
   void report_overdue();
   void check_link(FreeRunningTime now);
   void try_to_reopen(FreeRunningTime now);
-  void lose(const std::string& reason);
+  void lose(const OsError& error, const std::string& reason);
+  void lose(const OsError& error) { lose(error, error.message()); }
+  void stamp_in_hardware();
 
   Kernel& kernel_;
   PtpSocketConfig config_;
   TimestampClock& clock_;
   TransportHandler& handler_;
   std::optional<PtpSocket> socket_;
+  std::optional<OsError> closed_{};
   std::vector<int> watched_;
   bool carrier_ = true;
   bool carrier_is_reported_ = false;  // some virtual interfaces never say IFF_RUNNING

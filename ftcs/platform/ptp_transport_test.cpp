@@ -155,6 +155,36 @@ TEST(PtpTransport, an_address_that_is_taken_away_is_said_and_waited_for) {
   EXPECT_EQ(bench.recorder.events[1], "up");
 }
 
+TEST(PtpTransport,
+     an_interface_that_is_late_at_the_start_is_waited_for_and_each_reason_is_said_once) {
+  Bench bench;
+  bench.kernel.interface_flags = IFF_BROADCAST;
+  bench.kernel.interface_has_address = false;
+  ASSERT_FALSE(bench.transport.open_or_wait());
+  EXPECT_FALSE(bench.transport.is_up());
+  bench.run_for(seconds{60});
+  bench.kernel.interface_flags = IFF_UP | IFF_RUNNING;
+  bench.run_for(seconds{60});
+  ASSERT_TRUE(bench.transport.closed());
+  EXPECT_EQ(bench.transport.closed()->kind, OsErrorKind::kNoAddress);
+  bench.kernel.interface_has_address = true;
+  bench.run_for(seconds{2});  // soon after, however long it has waited
+  EXPECT_TRUE(bench.transport.is_up());
+  EXPECT_FALSE(bench.transport.closed());
+  EXPECT_EQ(bench.recorder.events,
+            (Events{"down: interface eth0: the interface is down",
+                    "down: interface eth0: no IP address of the version asked for", "up"}));
+}
+
+TEST(PtpTransport, an_interface_that_does_not_exist_at_the_start_is_not_waited_for) {
+  Bench bench;
+  bench.kernel.interface_exists = false;
+  const auto error = bench.transport.open_or_wait();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->kind, OsErrorKind::kNoSuchInterface);
+  EXPECT_TRUE(bench.recorder.events.empty());
+}
+
 TEST(PtpTransport, a_full_queue_says_nothing_of_the_link) {
   Bench bench;
   ASSERT_FALSE(bench.transport.open());
