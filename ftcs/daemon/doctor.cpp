@@ -164,12 +164,6 @@ diagnosis::Finding failure(std::string text, std::string remedy = {}) {
   return {diagnosis::Cause::kOther, std::move(text), "", std::move(remedy)};
 }
 
-/// Nothing to listen to; the port itself may have been up a moment ago.
-bool has_carrier(platform::Kernel& kernel, const std::string& interface) {
-  const auto state = platform::interface_state(kernel, interface);
-  return !state || !state->up || state->running;
-}
-
 std::int64_t utc_s(platform::Kernel& kernel) {
   return kernel.clock_ns(CLOCK_REALTIME) / kNsPerSecond;
 }
@@ -255,12 +249,9 @@ std::optional<Duration> first_offset(platform::Kernel& kernel, const PtpOptions&
 
 /// What the port, the wire and the clock that would be steered have shown.
 diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWatch& wire,
-                            const ClockWatch* clock, const PtpOptions& options) {
+                            const ClockWatch* clock) {
   diagnosis::PortSeen seen = port.seen();
   seen.on_wire = wire.finish();
-  if (seen.link == diagnosis::Link::kUp && !has_carrier(kernel, options.interface)) {
-    seen.link = diagnosis::Link::kNoCarrier;
-  }
   seen.utc_s = utc_s(kernel);
   if (clock != nullptr) {
     seen.foreign_changes = clock->changes();
@@ -303,7 +294,7 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   Trial port(kernel, options, log, std::move(clocks->timestamps), facts, clock ? &*clock : nullptr);
   (void)port.run();
   const auto far = steers ? first_offset(kernel, given, phc, port) : std::nullopt;
-  diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr, options);
+  diagnosis::PortSeen seen = seen_by(kernel, port, wire, clock ? &*clock : nullptr);
   seen.steers_real_clock = steers && !any_epoch;
   seen.first_offset = far;
   result.wire_unheard = wire.error();

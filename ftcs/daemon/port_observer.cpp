@@ -59,7 +59,7 @@ diagnosis::PortSeen seen_of_link(const PtpOptions& options,
   seen.settings = port_settings(options);
   const auto& closed = transport.closed();
   if (!closed) {
-    seen.link = transport.is_up() ? Link::kUp : Link::kNoCarrier;
+    seen.link = transport.is_up() && transport.has_carrier() ? Link::kUp : Link::kNoCarrier;
     return seen;
   }
   switch (closed->kind) {

@@ -86,7 +86,11 @@ int PtpPort::run(const std::function<bool()>& stop) {
 void PtpPort::start_port() {
   start(now());
   started_ = true;
-  if (transport_.closed()) on_link_change(false, now());
+  if (transport_.closed()) return on_link_change(false, now());
+  const auto trouble = diagnosis::link_trouble(seen_of_link());
+  if (transport_.socket() == nullptr || !trouble) return;
+  log_(LogLevel::kNotice, "port 1 ({}): {}; {}", options_.interface, trouble->seen,
+       trouble->remedy);
 }
 
 void PtpPort::turn(std::optional<FreeRunningTime> end) {

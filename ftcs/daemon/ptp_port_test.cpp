@@ -98,6 +98,22 @@ TEST(PtpPort, waits_for_a_late_interface_says_why_and_locks) {
   }
 }
 
+TEST(PtpPort, a_missing_carrier_at_the_start_is_the_reason_unless_somebody_is_heard) {
+  Link link;
+  link.kernel.interface_flags = IFF_UP;
+  link.kernel.is_silent = true;
+  link.options.duration = Duration::from_ns(10 * kSecond);
+  EXPECT_EQ(link.run(), kNotLocked) << link.said;
+  EXPECT_NE(link.said.find("port 1 (eth0): the link of eth0 is down: no carrier; the cable"),
+            std::string::npos)
+      << link.said;
+  EXPECT_NE(link.said.find("not locked: the link of eth0 is down: no carrier"), std::string::npos)
+      << link.said;
+  Link of_some_virtual_interface;
+  of_some_virtual_interface.kernel.interface_flags = IFF_UP;
+  EXPECT_EQ(of_some_virtual_interface.run(), kSuccess) << of_some_virtual_interface.said;
+}
+
 TEST(PtpPort, an_interface_that_stays_down_is_the_reason_at_the_end) {
   for (const Role role : {Role::kTimeReceiver, Role::kTimeTransmitter}) {
     Link link;

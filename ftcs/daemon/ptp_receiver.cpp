@@ -180,7 +180,9 @@ PortTotals PtpReceiver::totals() {
 diagnosis::PortSeen PtpReceiver::seen(FreeRunningTime now) {
   diagnosis::PortSeen seen = observer_.seen(now, totals());
   const diagnosis::PortSeen link = seen_of_link();
-  seen.link = link.link;
+  // Whoever is heard is there, whatever the interface says of its carrier.
+  const bool is_heard = transport().is_up() && !seen.at_port.all().empty();
+  seen.link = is_heard ? diagnosis::Link::kUp : link.link;
   seen.closed = link.closed;
   seen.has_transmitter = node_.port().transmitter() != nullptr;
   seen.peer_delay = node_.port().peer_delay().mean_link_delay();

@@ -39,7 +39,8 @@ std::optional<OsError> PtpTransport::open() {
   if (!opened) return opened.error();
   socket_.emplace(std::move(*opened));
   closed_.reset();
-  carrier_is_reported_ = socket_->interface().running;
+  running_ = socket_->interface().running;
+  carrier_is_reported_ = running_;
   carrier_ = true;
   suspect_ = false;
   reopen_delay_ = kFirstReopenDelay;
@@ -159,9 +160,11 @@ void PtpTransport::check_link(FreeRunningTime now) {
       return lose(*none);
     }
   }
+  const bool came = state->running && !running_;
+  running_ = state->running;
   carrier_is_reported_ = carrier_is_reported_ || state->running;
   const bool carrier = state->running || !carrier_is_reported_;
-  if (carrier == carrier_) return;
+  if (carrier == carrier_ && !came) return;
   carrier_ = carrier;
   handler_.on_link(carrier, carrier ? "" : interface + ": no carrier");
 }

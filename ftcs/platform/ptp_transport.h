@@ -69,6 +69,9 @@ class PtpTransport {
   static constexpr std::size_t kLargestWatch = 4;
 
   [[nodiscard]] bool is_up() const noexcept { return socket_.has_value() && carrier_; }
+  /// Whether the kernel says that the link has carrier. Some virtual interfaces never do: is_up()
+  /// is then true all the same.
+  [[nodiscard]] bool has_carrier() const noexcept { return running_; }
   /// Why there are no sockets; none: there are, or open() was not called.
   [[nodiscard]] const std::optional<OsError>& closed() const noexcept { return closed_; }
   /// No value while the link is down.
@@ -93,6 +96,7 @@ class PtpTransport {
   std::optional<OsError> closed_{};
   std::vector<int> watched_;
   bool carrier_ = true;
+  bool running_ = false;              // as the kernel said last
   bool carrier_is_reported_ = false;  // some virtual interfaces never say IFF_RUNNING
   bool suspect_ = false;              // a call failed: look at the link at once
   FreeRunningTime next_check_{};

@@ -131,6 +131,20 @@ TEST(PtpTransport, keeps_its_sockets_while_the_carrier_is_away) {
   EXPECT_EQ(bench.transport.socket()->descriptor(Channel::kEvent), descriptor);
 }
 
+// Some virtual interfaces never say that they have a carrier: the port is up all the same.
+TEST(PtpTransport, a_carrier_that_is_missing_at_the_start_is_known_and_its_coming_is_told) {
+  Bench bench;
+  bench.kernel.interface_flags = IFF_UP;
+  ASSERT_FALSE(bench.transport.open_or_wait());
+  bench.run_for(seconds{2});
+  EXPECT_TRUE(bench.transport.is_up());
+  EXPECT_FALSE(bench.transport.has_carrier());
+  bench.kernel.interface_flags = IFF_UP | IFF_RUNNING;
+  bench.run_for(seconds{2});
+  EXPECT_TRUE(bench.transport.has_carrier());
+  EXPECT_EQ(bench.recorder.events, Events{"up"});
+}
+
 TEST(PtpTransport, looks_at_the_link_at_once_when_sending_fails) {
   Bench bench;
   ASSERT_FALSE(bench.transport.open());

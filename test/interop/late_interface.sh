@@ -81,3 +81,15 @@ code=0
 wait "$receiver" || code=$?
 [ "$code" -eq 3 ] || fail "stopped while it waits: exit code $code, expected 3"
 grep -q "not locked: $our_interface is down" "$folder/stopped.log" || fail "no reason at the end"
+
+# The interface is up, and nothing at the other end of its cable: that is the reason, and not a transmitter that is off.
+ip -n "$theirs" link set "$their_interface" down
+ip -n "$ours" link set "$our_interface" up
+ip netns exec "$ours" "$ftcs" ptp -i "$our_interface" "${fast[@]}" --uds_address "$folder/ours" > "$folder/carrier.log" 2>&1 &
+receiver=$!
+pids+=("$receiver")
+wait_for carrier "port 1 ($our_interface): the link of $our_interface is down: no carrier"
+status "$ours" ours | grep -q "not locked: the link of $our_interface is down: no carrier" || fail "status without a carrier"
+ip -n "$theirs" link set "$their_interface" up
+wait_for carrier "link up"
+wait_for carrier "UNCALIBRATED to SLAVE"

@@ -24,6 +24,7 @@ class NetworkKernel final : public platform::FakeClocks {
   double reference_ahead = kTai;  ///< of ideal time
   std::uint16_t flags = ptp::flag::kPtpTimescale | ptp::flag::kUtcOffsetValid;
   std::function<void()> on_second;
+  bool is_silent = false;       ///< nothing is announced
   double stamp_delay_ns = 0.0;  ///< until a transmit stamp is there; negative: for ever
 
   int poll(std::span<pollfd> descriptors, int timeout_ms) noexcept override {
@@ -86,6 +87,7 @@ class NetworkKernel final : public platform::FakeClocks {
   void transmit() {
     next_ns_ = ideal_ns + kSecond;
     if (on_second) on_second();
+    if (is_silent) return;
     ptp::Message announce = about(sequence_);
     announce.header.flags = flags;
     ptp::Announce body;
