@@ -55,6 +55,16 @@ void print_talker(const diagnosis::Talker& talker) {
              counted);
 }
 
+void print_heard(const daemon::Examination& result) {
+  fmt::print("heard{}:{}\n", result.wire_unheard ? " at this port" : " on the wire",
+             result.heard.empty() ? " nobody" : "");
+  for (const diagnosis::Talker& talker : result.heard) print_talker(talker);
+  if (result.wire_unheard) {
+    fmt::print("the wire itself was not listened to ({}): root or CAP_NET_RAW can\n",
+               *result.wire_unheard);
+  }
+}
+
 int run(const PtpArguments& arguments) {
   daemon::PtpOptions options;
   if (const auto wrong = make_ptp_options(arguments, options)) {
@@ -67,23 +77,18 @@ int run(const PtpArguments& arguments) {
   }
   options.socket.interface = options.interface;
   if (!options.duration) options.duration = Duration::from_ns(kUsualSeconds * 1e9);
-  fmt::print("listening on {} for {:.0f} s; no clock is steered\n", options.interface,
-             options.duration->seconds());
-  std::fflush(stdout);
   platform::LinuxKernel kernel;
-  const daemon::Examination result = daemon::examine(kernel, options);
+  const daemon::Examination result = daemon::examine(kernel, options, [&options] {
+    fmt::print("listening on {} for {:g} s; no clock is steered\n", options.interface,
+               options.duration->seconds());
+    std::fflush(stdout);
+  });
   bool decisive = true;
   for (const diagnosis::Finding& finding : result.findings) {
     print_finding(finding, decisive);
     decisive = false;
   }
-  fmt::print("heard{}:{}\n", result.wire_unheard ? " at this port" : " on the wire",
-             result.heard.empty() ? " nobody" : "");
-  for (const diagnosis::Talker& talker : result.heard) print_talker(talker);
-  if (result.wire_unheard) {
-    fmt::print("the wire itself was not listened to ({}): root or CAP_NET_RAW can\n",
-               *result.wire_unheard);
-  }
+  if (result.listened) print_heard(result);
   const bool good = result.findings.front().cause == diagnosis::Cause::kLocked;
   return good ? kSuccess : kNotLocked;
 }

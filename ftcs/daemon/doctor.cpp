@@ -225,6 +225,17 @@ std::optional<diagnosis::Finding> missing_clock(platform::Kernel& kernel, const 
   return failure(device.error().message(), "--clock system steers the system clock instead");
 }
 
+/// It can be told without listening: the interface is not there, or it is down.
+std::optional<diagnosis::Finding> unusable(platform::Kernel& kernel, const PtpOptions& options) {
+  const auto state = platform::interface_state(kernel, options.interface);
+  if (!state) return failure(state.error().message());
+  if (state->up) return std::nullopt;
+  diagnosis::PortSeen seen;
+  seen.settings = port_settings(options);
+  seen.link = diagnosis::Link::kDown;
+  return diagnosis::link_trouble(seen);
+}
+
 /// How far the real clock that would be steered is from the reference, if that is farther than is
 /// slewed and no step is allowed.
 std::optional<Duration> first_offset(platform::Kernel& kernel, const PtpOptions& given,
@@ -262,12 +273,17 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
 
 }  // namespace
 
-Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
+Examination examine(platform::Kernel& kernel, const PtpOptions& given,
+                    const std::function<void()>& listens) {
   const bool steers = given.clock.kind != ClockKind::kVirtual;
   const bool any_epoch = given.follower.epoch.any_epoch;
   const bool adapter_stamps = has_adapter_stamps(kernel, given);
   const PtpOptions options = trial(kernel, given, adapter_stamps);
   Examination result;
+  if (auto known = unusable(kernel, given)) {
+    result.findings.push_back(std::move(*known));
+    return result;
+  }
   // The hardware clock is looked at even where a trial without its stamps has to do.
   const bool phc = given.clock.kind == ClockKind::kPhc ||
                    (given.clock.kind == ClockKind::kAuto && adapter_stamps);
@@ -288,6 +304,8 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given) {
   }
   PortFacts facts{{identity->clock, kPortOfItsOwn}};
   facts.hardware_stamps = clocks->timestamps->is_hardware();
+  result.listened = true;
+  if (listens) listens();
   std::optional<ClockWatch> clock;
   if (steers) clock.emplace(kernel, options, phc);
   WireWatch wire(options.interface, identity->clock);

@@ -48,6 +48,21 @@ TEST_F(Doctor, has_no_doubt_where_nobody_steers_the_clock) {
 
 // The stamps of the adapter are not switched on for a look, but the clock to be looked at is the
 // one that is to be steered.
+TEST_F(Doctor, does_not_listen_where_the_interface_tells_what_is_wrong) {
+  int listened = 0;
+  const auto cause = [&] { return first(examine(kernel, options, [&] { ++listened; })).cause; };
+  kernel.interface_flags = 0;
+  EXPECT_EQ(cause(), Cause::kLinkDown);
+  kernel.interface_exists = false;
+  EXPECT_EQ(cause(), Cause::kOther);
+  EXPECT_EQ(listened, 0);
+  kernel.interface_exists = true;
+  kernel.interface_flags = IFF_UP | IFF_RUNNING;
+  kernel.interface_has_address = false;
+  EXPECT_EQ(cause(), Cause::kNoAddress);
+  EXPECT_EQ(listened, 1);
+}
+
 TEST_F(Doctor, names_another_program_that_steers_the_adapters_clock_though_its_stamps_are_off) {
   for (const bool stamps_are_on : {false, true}) {
     kernel.stamps_are_on = stamps_are_on;

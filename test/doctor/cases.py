@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Misconfigurations: name, who transmits ("raw": transmitter.py with these faults; "ptp4l": Debian's with these lines),
 the receiver's flags, the cause that must be told and a part of the remedy. Further keys: prepare, a command in our namespace;
-second, the faults of another transmitter beside the first."""
+second, the faults of another transmitter beside the first; listens, False where the cause is known without listening."""
 
 
 def case(name, by, faults, flags, cause, remedy, **more):
@@ -56,9 +56,13 @@ CASES = [
     case("a reference in 1970", "raw", ["ahead=-1000000000"], ["--clock", "system"], "timescale", "--max-first-change"),
     case("37 s away, and no step", "raw", [], [], "first_offset", "--offset 37s"),
     case("the system clock is 5 s away, and no step", "raw", ["ahead=42"], ["--clock", "system"], "first_offset", "--first-step"),
-    case("the link is down", None, [], [], "link_down", "ip link set", prepare="ip link set $INTERFACE down"),
-    case("no such adapter clock", None, [], ["-H"], "other", "hardware"),
-    case("a clock that the adapter does not have", "raw", [], ["--clock", "phc"], "other", "--clock system"),
+    case("the link is down", None, [], [], "link_down", "ip link set", prepare="ip link set $INTERFACE down",
+         listens=False),
+    case("nobody at the other end", None, [], [], "link_down", "no carrier", prepare="ip -n $THEIRS link set $PEER down"),
+    case("no IPv4 address", "raw", [], [], "no_address", "ip address add", prepare="ip address flush dev $INTERFACE"),
+    case("no such interface", None, [], ["-i", "nosuch0"], "other", "no such device", listens=False),
+    case("no such adapter clock", None, [], ["-H"], "other", "hardware", listens=False),
+    case("a clock that the adapter does not have", "raw", [], ["--clock", "phc"], "other", "--clock system", listens=False),
 ]
 # A receiver that nothing stands in the way of is locked: else the table above would show nothing.
 GOOD = [case("Debian's ptp4l", "ptp4l", [], [], "locked", ""), case("frames of our own", "raw", [], ["--first-step"], "locked", ""),

@@ -75,14 +75,17 @@ def examine(ftcs, number, case, listen_s):
     """What is wrong with the answer, or nothing; and its first line."""
     with Network(number) as network:
         if "prepare" in case:
-            command = case["prepare"].replace("$INTERFACE", network.interface)
+            command = case["prepare"].replace("$INTERFACE", network.interface).replace("$PEER", network.peer)
+            command = command.replace("$THEIRS", network.theirs)
             call("ip", "netns", "exec", network.ours, "sh", "-c", command)
         network.transmit(case)
-        done = subprocess.run(["ip", "netns", "exec", network.ours, ftcs, "doctor", "-i", network.interface, "--duration", str(listen_s),
+        interface = [] if "-i" in case["flags"] else ["-i", network.interface]
+        done = subprocess.run(["ip", "netns", "exec", network.ours, ftcs, "doctor", *interface, "--duration", str(listen_s),
                                "--logAnnounceInterval", "-1", "--logMinDelayReqInterval", "-2", *case["flags"]],
                               capture_output=True, text=True, timeout=60)
     lines = done.stdout.splitlines()
-    sentence = lines[1] if len(lines) > 1 else ""
+    listened = bool(lines) and lines[0].startswith("listening on ")
+    sentence = next((line for line in lines if not line.startswith("listening on ")), "")
     causes = [line.split()[1] for line in lines if line.startswith("  cause")]
     wrong = []
     if causes[:1] != [case["cause"]]:
@@ -92,6 +95,8 @@ def examine(ftcs, number, case, listen_s):
     good = case["cause"] == "locked"
     if sentence.startswith("locked") != good or (not good and not sentence.startswith(("not locked: ", "in doubt: "))):
         wrong.append("locked or not?")
+    if listened != case.get("listens", True):
+        wrong.append("says that it listens, and knows the cause before" if listened else "does not listen")
     if done.returncode != (0 if good else 3):
         wrong.append(f"exit code {done.returncode}")
     if wrong:
