@@ -16,6 +16,7 @@ std::string_view name(Cause cause) noexcept {
       "group",
       "not_delivered",
       "unicast",
+      "multicast",
       "version",
       "sdo",
       "domain",

@@ -20,6 +20,7 @@ enum class Cause : std::uint8_t {
   kGroup,         ///< L2: to another group address
   kNotDelivered,  ///< on the wire, but not at our socket: a firewall, rp_filter
   kUnicast,       ///< to our own address, which is not listened to
+  kMulticast,     ///< to the group, while only a unicast peer is listened to
   kVersion,       ///< IEEE 1588-2002
   kSdo,           ///< another majorSdoId (transportSpecific)
   kDomain,

@@ -106,6 +106,14 @@ std::vector<Case> heard() {
               s.on_wire->on_message(message(ptp::Announce{}), Way::kUdpIpv4);
             }),
        "rp_filter"},
+      {Cause::kMulticast,
+       with(fresh(),
+            [](PortSeen& s) {
+              s.settings.unicast = true;
+              s.on_wire.emplace();
+              s.on_wire->on_message(message(ptp::Announce{}), Way::kUdpIpv4);
+            }),
+       "leave --unicast out"},
       {Cause::kSyncWithoutAnnounce,
        with(fresh(),
             [](PortSeen& s) { s.at_port.on_message(message(ptp::Sync{}), Way::kUdpIpv4); }),

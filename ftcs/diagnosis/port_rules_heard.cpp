@@ -166,6 +166,20 @@ Found unicast(const PortSeen& seen) {
                  "multicast, which alone is listened to", "--unicast ADDRESS of the transmitter"};
 }
 
+Found multicast(const PortSeen& seen) {
+  if (!seen.settings.unicast) return std::nullopt;
+  const auto ours = [&](const Talker& talker) { return is_for(talker, seen.settings); };
+  const Talker* const one =
+      transmitter(seen, [&](const Talker& talker) { return ours(talker) && talker.to_group; });
+  const bool is_served = transmitter(seen, [&](const Talker& talker) {
+                           return ours(talker) && !talker.to_group;
+                         }) != nullptr;
+  if (one == nullptr || is_served) return std::nullopt;
+  return Finding{Cause::kMulticast, fmt::format("{} sends to the multicast group", who(*one)),
+                 "messages to this host's own address, as --unicast has it",
+                 "leave --unicast out, or set the transmitter to unicast"};
+}
+
 Found vlan(const PortSeen& seen) {
   const Talker* const one =
       transmitter(seen, [](const Talker& talker) { return talker.vlan != 0; });
@@ -191,7 +205,7 @@ Found transport(const PortSeen& seen) {
 }
 
 Found not_delivered(const PortSeen& seen) {
-  if (!seen.on_wire || seen.link != Link::kUp) return std::nullopt;
+  if (!seen.on_wire || seen.link != Link::kUp || multicast(seen)) return std::nullopt;
   const auto ours = [&](const Talker& talker) {
     return is_for(talker, seen.settings) && talker.announces();
   };
@@ -271,11 +285,23 @@ bool is_for(const Talker& talker, const PortSettings& settings) noexcept {
 }
 
 std::span<const PortRule> rules_of_hearing() noexcept {
-  static constexpr std::array<PortRule, 15> kRules{
-      not_acceptable, not_authentic, not_capable,    unusable_announce,
-      alternate,      unicast,       not_delivered,  sync_without_announce,
-      domain,         sdo,           transport,      vlan,
-      version,        malformed,     only_receivers,
+  static constexpr std::array<PortRule, 16> kRules{
+      not_acceptable,
+      not_authentic,
+      not_capable,
+      unusable_announce,
+      alternate,
+      unicast,
+      multicast,
+      not_delivered,
+      sync_without_announce,
+      domain,
+      sdo,
+      transport,
+      vlan,
+      version,
+      malformed,
+      only_receivers,
   };
   return kRules;
 }

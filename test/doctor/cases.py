@@ -35,6 +35,7 @@ CASES = [
     case("PTP version 1", "raw", ["version=1"], [], "version", "do not understand each other"),
     case("rp_filter drops them", "raw", ["source=192.0.2.9"], [], "not_delivered", "rp_filter",
          prepare="for i in all default $INTERFACE; do sysctl -qw net.ipv4.conf.$i.rp_filter=1; done"),
+    case("multicast, and --unicast given", "ptp4l", [], ["--unicast", "10.77.0.2"], "multicast", "leave --unicast out"),
     case("Sync without Announce", "raw", ["announce=0"], [], "sync_without_announce", "UDP port 320"),
     case("Announce without Sync", "raw", ["sync=0"], [], "no_sync", "not in the state MASTER"),
     case("Sync without Follow_Up", "raw", ["follow_up=0"], [], "no_follow_up", "no transmit timestamps"),
