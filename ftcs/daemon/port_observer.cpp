@@ -49,6 +49,7 @@ diagnosis::PortSettings port_settings(const PtpOptions& options) {
   settings.unicast = options.socket.unicast.has_value();
   settings.steers =
       !options.follower.free_running && options.follower.servo.kind != ServoKind::kFreeRunning;
+  settings.announce_interval_s = std::exp2(options.protocol.log_announce_interval);
   return settings;
 }
 
@@ -93,6 +94,13 @@ PortObserver::PortObserver(const PtpOptions& options, const ptp::ClockIdentity& 
 void PortObserver::on_message(std::span<const std::uint8_t> message) noexcept {
   older_.talkers.on_message(message, settings_.way);
   newer_.talkers.on_message(message, settings_.way);
+}
+
+void PortObserver::restart(FreeRunningTime now, const PortTotals& totals) {
+  newer_.at = now;
+  newer_.totals = totals;
+  newer_.talkers.clear();
+  older_ = newer_;
 }
 
 void PortObserver::turn(FreeRunningTime now, const PortTotals& totals) {

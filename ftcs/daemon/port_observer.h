@@ -30,6 +30,8 @@ class PortObserver {
 
   /// Every message that reached the port.
   void on_message(std::span<const std::uint8_t> message) noexcept;
+  /// Forgets what it met: a link has come up, and what was not heard before is no sign.
+  void restart(FreeRunningTime now, const PortTotals& totals);
   /// Once per turn of the loop.
   void turn(FreeRunningTime now, const PortTotals& totals);
   /// Settings, talkers and what was counted; the rest is the port's to fill in.

@@ -83,6 +83,7 @@ void PtpReceiver::on_timer(FreeRunningTime now) {
 
 void PtpReceiver::on_link_change(bool up, FreeRunningTime now) {
   if (up) {
+    observer_.restart(now, totals());
     node_.on_link_up(now);
   } else {
     node_.on_link_down(now);
@@ -150,9 +151,11 @@ void PtpReceiver::housekeeping(FreeRunningTime now) {
   }
   // Whoever runs for days must not wait for the end to learn this.
   constexpr double kPatienceInAnnounces = 5.0;
+  constexpr double kLeastPatienceS = 2.5;  // before, a diagnosis blames nobody
   if (!looked_for_missing_ &&
       seconds_since_start() >
-          kPatienceInAnnounces * std::exp2(options().protocol.log_announce_interval)) {
+          std::fmax(kLeastPatienceS,
+                    kPatienceInAnnounces * std::exp2(options().protocol.log_announce_interval))) {
     looked_for_missing_ = true;
     if (node_.locked() || node_.discipline().path_delay_known()) return;
     log_findings(LogLevel::kWarning);

@@ -64,6 +64,7 @@ TEST(StatusReport, ATimeReceiverThatHearsNobodyKnowsNoOffset) {
   const ptp::ManagementCounters management{};
   diagnosis::PortSeen seen;
   seen.settings.interface = "eth0";
+  seen.seconds = 10.0;
   const auto json = receiver_status({options, facts, 1.0, management}, core, follower.record(),
                                     seen, source.now());
   EXPECT_NE(json.find("\"offset_ns\": null"), std::string::npos) << json;

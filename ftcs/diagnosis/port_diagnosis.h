@@ -36,8 +36,9 @@ struct PortSettings {
   bool capability_needed = false;  ///< IEEE 802.1AS
   Nanoseconds lowest_peer_delay{};
   Nanoseconds highest_peer_delay{};
-  bool unicast = false;  ///< one configured peer instead of the group
-  bool steers = true;    ///< else it measures alone
+  bool unicast = false;              ///< one configured peer instead of the group
+  bool steers = true;                ///< else it measures alone
+  double announce_interval_s = 2.0;  ///< as far as the port knows
 };
 
 /// What came of it, lately: counters are those of the last `seconds`, so that a sentence is of now.

@@ -254,6 +254,35 @@ TEST(PortDiagnosis, each_cause_has_its_sentence_and_none_says_locked) {
   }
 }
 
+TEST(PortDiagnosis, nobody_is_blamed_before_an_announce_may_have_come) {
+  const PortSeen silent = fresh();
+  PortSeen syncs = fresh();
+  syncs.at_port.on_message(message(ptp::Sync{}), Way::kUdpIpv4);
+  PortSeen asked = fresh();
+  asked.at_port.on_message(message(ptp::DelayReq{}), Way::kUdpIpv4);
+  for (PortSeen seen : {silent, syncs, asked}) {
+    const Cause in_time = diagnose(seen).cause;
+    seen.seconds = 0.5;
+    EXPECT_EQ(sentence(diagnose(seen)),
+              "not locked: no Announce yet after 0.5 s on eth0, domain 0, UDPv4, transportSpecific "
+              "0; expected one every 2 s");
+    seen.seconds = 5.9;
+    EXPECT_EQ(diagnose(seen).expected, "one every 2 s");
+    seen.seconds = 6.1;
+    EXPECT_EQ(diagnose(seen).cause, in_time);
+    EXPECT_NE(diagnose(seen).expected, "one every 2 s");
+    seen.settings.announce_interval_s = 0.125;
+    seen.seconds = 1.9;
+    EXPECT_EQ(diagnose(seen).cause, Cause::kNoAnnounce);
+    seen.seconds = 2.1;
+    EXPECT_EQ(diagnose(seen).cause, in_time);
+  }
+  PortSeen elsewhere = fresh();
+  elsewhere.seconds = 0.1;
+  elsewhere.at_port.on_message(message(ptp::Announce{}, {.domain = 5}), Way::kUdpIpv4);
+  EXPECT_EQ(diagnose(elsewhere).cause, Cause::kDomain) << "what was heard is no guess";
+}
+
 TEST(PortDiagnosis, a_locked_port_says_so_whatever_else_was_counted) {
   PortSeen seen = followed();
   seen.locked = true;

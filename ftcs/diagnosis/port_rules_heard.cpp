@@ -232,7 +232,15 @@ Found malformed(const PortSeen& seen) {
                  "messages as IEEE 1588 has them", "the transmitter is at fault"};
 }
 
+/// An Announce may not have had its turn yet: nobody is to blame.
+bool is_early(const PortSeen& seen) {
+  constexpr double kLeastS = 2.0;
+  constexpr double kIntervals = 3.0;
+  return seen.seconds < std::fmax(kLeastS, kIntervals * seen.settings.announce_interval_s);
+}
+
 Found sync_without_announce(const PortSeen& seen) {
+  if (is_early(seen)) return std::nullopt;
   const Talker* const one = transmitter(seen, [&](const Talker& talker) {
     return is_for(talker, seen.settings) && talker.count(MessageType::kSync) > 0;
   });
@@ -244,6 +252,7 @@ Found sync_without_announce(const PortSeen& seen) {
 }
 
 Found only_receivers(const PortSeen& seen) {
+  if (is_early(seen)) return std::nullopt;
   const auto asks = [&](const Talker& talker) {
     return is_for(talker, seen.settings) && !talker.transmits();
   };
@@ -256,10 +265,16 @@ Found only_receivers(const PortSeen& seen) {
 
 Found no_announce(const PortSeen& seen) {
   const PortSettings& settings = seen.settings;
+  const std::string where =
+      fmt::format("on {}, domain {}, {}, transportSpecific {}", settings.interface, settings.domain,
+                  name(settings.way), settings.major_sdo_id);
+  if (is_early(seen)) {
+    return Finding{Cause::kNoAnnounce,
+                   fmt::format("no Announce yet after {:.1f} s {}", seen.seconds, where),
+                   fmt::format("one every {:g} s", settings.announce_interval_s), ""};
+  }
   return Finding{
-      Cause::kNoAnnounce,
-      fmt::format("no time transmitter was heard on {}, domain {}, {}, transportSpecific {}",
-                  settings.interface, settings.domain, name(settings.way), settings.major_sdo_id),
+      Cause::kNoAnnounce, "no time transmitter was heard " + where,
       "an Announce every second or two",
       seen.on_wire
           ? std::string("nothing of PTP is on this wire: the transmitter is off, on another "

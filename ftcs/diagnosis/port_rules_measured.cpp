@@ -220,8 +220,9 @@ std::optional<Finding> no_peer(const PortSeen& seen) {
 
 std::span<const PortRule> rules_of_measuring() noexcept {
   static constexpr std::array<PortRule, 12> kRules{
-      no_receive_stamps,  no_sync,         no_follow_up, two_transmitters, one_identity,  timescale, no_peer,
-      no_transmit_stamps, no_delay_answer, first_offset, other_steers,     samples_refused,
+      no_receive_stamps, no_sync,      no_follow_up, two_transmitters,
+      one_identity,      timescale,    no_peer,      no_transmit_stamps,
+      no_delay_answer,   first_offset, other_steers, samples_refused,
   };
   return kRules;
 }

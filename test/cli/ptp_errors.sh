@@ -156,7 +156,7 @@ holder=
 
 # Nobody there: the last lines say where was listened.
 "$ftcs" ptp -i lo "${ports[@]}" --domainNumber 7 -P --duration 0.3 > "$folder/out"
-for text in "not locked: no time transmitter was heard on lo, domain 7, UDPv4, transportSpecific 0" "no peer delay: the neighbour"; do
+for text in "not locked: no Announce yet after 0.3 s on lo, domain 7, UDPv4, transportSpecific 0" "no peer delay: the neighbour"; do
   grep -qF "$text" "$folder/out" && continue
   echo "FAILED: nobody there, expected '$text'; got:"
   cat "$folder/out"

@@ -38,10 +38,11 @@ echo "ethercat: $(grep '^STATUS=locked' "$folder/ethercat" | tail -1)"
 
 listen ptp
 ptp() { exec "$ftcs" ptp -i lo --event-port $((port + 4000)) --general-port $((port + 8000)) --uds_address none "$@"; }
-NOTIFY_SOCKET="$folder/ptp.socket" ptp --offset 1ms --skew 50ppm --logAnnounceInterval -2 --duration 12 > "$folder/receiver" 2>&1 &
+NOTIFY_SOCKET="$folder/ptp.socket" ptp --offset 1ms --skew 50ppm --logAnnounceInterval -2 --duration 14 > "$folder/receiver" 2>&1 &
 receiver=$!
-sleep 2
+sleep 4
 grep -q '^READY=1' "$folder/ptp" && fail "ready without a time transmitter"
+grep -q '^STATUS=not locked: no Announce yet after 0' "$folder/ptp" || fail "ptp: blames somebody at once"
 grep -q '^STATUS=not locked: no time transmitter was heard on lo, domain 0' "$folder/ptp" || fail "ptp: no sentence"
 ptp --role time-transmitter --logSyncInterval -4 --logAnnounceInterval -2 --logMinDelayReqInterval -4 > "$folder/transmitter" 2>&1 &
 pids+=($!)

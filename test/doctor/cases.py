@@ -37,6 +37,7 @@ CASES = [
          prepare="for i in all default $INTERFACE; do sysctl -qw net.ipv4.conf.$i.rp_filter=1; done"),
     case("multicast, and --unicast given", "ptp4l", [], ["--unicast", "10.77.0.2"], "multicast", "leave --unicast out"),
     case("Sync without Announce", "raw", ["announce=0"], [], "sync_without_announce", "UDP port 320"),
+    case("Sync, and no time for an Announce", "raw", ["announce=0"], ["--duration", "1"], "no_announce", "no Announce yet after 1.0 s"),
     case("Announce without Sync", "raw", ["sync=0"], [], "no_sync", "not in the state MASTER"),
     case("Sync without Follow_Up", "raw", ["follow_up=0"], [], "no_follow_up", "no transmit timestamps"),
     case("no Delay_Resp", "raw", ["delay_resp=0"], [], "no_delay_resp", "do not reach the transmitter"),

@@ -79,9 +79,9 @@ def examine(ftcs, number, case, listen_s):
             command = command.replace("$THEIRS", network.theirs)
             call("ip", "netns", "exec", network.ours, "sh", "-c", command)
         network.transmit(case)
-        interface = [] if "-i" in case["flags"] else ["-i", network.interface]
-        done = subprocess.run(["ip", "netns", "exec", network.ours, ftcs, "doctor", *interface, "--duration", str(listen_s),
-                               "--logAnnounceInterval", "-1", "--logMinDelayReqInterval", "-2", *case["flags"]],
+        usual = {"-i": network.interface, "--duration": str(listen_s), "--logAnnounceInterval": "-1", "--logMinDelayReqInterval": "-2"}
+        flags = [word for name, value in usual.items() if name not in case["flags"] for word in (name, value)]
+        done = subprocess.run(["ip", "netns", "exec", network.ours, ftcs, "doctor", *flags, *case["flags"]],
                               capture_output=True, text=True, timeout=60)
     lines = done.stdout.splitlines()
     listened = bool(lines) and lines[0].startswith("listening on ")
