@@ -11,18 +11,16 @@
 namespace ftcs::estimation {
 namespace {
 
-constexpr double kLn2Pi = 1.8378770664093453;
 /// Beyond this many sigma on the late side the normal part no longer matters.
 constexpr double kFarLate = 8.0;
 constexpr double kSmallestCurvature = 1e-12;
 
 /// phi(u) / Phi(u), the inverse Mills ratio at -u.
 double hazard(double u) noexcept {
-  constexpr double kRootTwo = std::numbers::sqrt2;
   constexpr double kRootHalfPi = 1.2533141373155003;
-  if (u <= 0.0) return 1.0 / (kRootHalfPi * scaled_erfc(-u / kRootTwo));
+  if (u <= 0.0) return 1.0 / (kRootHalfPi * scaled_erfc(-u / std::numbers::sqrt2));
   const double phi = quick_exp(-0.5 * u * u - 0.5 * kLn2Pi);
-  return phi / (1.0 - phi * kRootHalfPi * scaled_erfc(u / kRootTwo));
+  return phi / (1.0 - phi * kRootHalfPi * scaled_erfc(u / std::numbers::sqrt2));
 }
 
 }  // namespace

@@ -5,19 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numbers>
+
+#include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
-constexpr double kLn2 = 0.6931471805599453;
-// ln 2 in two parts: a multiple of the first by an integer of 11 bits is exact.
-constexpr double kLn2High = 0.693147180369123816490;
-constexpr double kLn2Low = 1.90821492927058770002e-10;
-constexpr double kRound =
-    6755399441055744.0;  // 1.5 2^52: what is added to it is rounded to an integer
-
-constexpr std::uint64_t kMantissa = 0x000FFFFFFFFFFFFFULL;
-constexpr std::uint64_t kSqrtHalf = 0x3FE6A09E667F3BCDULL;  // bits of sqrt(1/2)
+using quick::kLn2High, quick::kLn2Low, quick::kMantissa, quick::kRound, quick::kSqrtHalf;
 
 constexpr double kExp[] = {1.0 / 6227020800, 1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800,
                            1.0 / 362880,     1.0 / 40320,     1.0 / 5040,     1.0 / 720,
@@ -53,7 +48,7 @@ double portable_exp(double x) noexcept {
   if (x > 710.0) return std::numeric_limits<double>::infinity();
   if (x < -746.0) return 0.0;
   if (x != x) return x;
-  const double n = (x * (1.0 / kLn2) + kRound) - kRound;
+  const double n = (x * (1.0 / std::numbers::ln2) + kRound) - kRound;
   const double high = x - n * kLn2High;
   const double low = n * kLn2Low;
   const double r = high - low;

@@ -25,10 +25,6 @@ constexpr std::uint32_t kMixFrom = 4;
 constexpr std::uint32_t kJudgeFrom = 6;
 constexpr std::uint32_t kLearnFrom = 16;
 constexpr std::uint32_t kYoung = 100;
-/// Where the noise is known: a host that stands still makes more than half of
-/// the window late now and then, and its milliseconds must not become the noise
-/// at once.
-constexpr double kLargestResidual = 30.0;
 /// The second opinion costs more than everything else: always early, and where
 /// what was known has just been forgotten; later every so often.
 constexpr std::uint32_t kOpinionOften = 32;
@@ -223,9 +219,7 @@ void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
                                   const Innovations& innovations) noexcept {
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
-    const double size = std::sqrt(innovations.distance[best_]);
-    const double most = learner_[side].mature() ? kLargestResidual : size;
-    if (since_change_ > 0) residuals_.push(scale_ * std::min(size, most));
+    if (since_change_ > 0) residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
     follow_scale();
   }
   if (count_ > kLearnFrom) {

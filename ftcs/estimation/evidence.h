@@ -83,7 +83,7 @@ class Evidence {
     return lane_of(lowest, place, best_cost);
   }
 
-  /// Writes weights that lean to the wilder models, for the deviation: w_i times Grid::kLean a
+  /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean a
   /// place, sum one. Which of two models that explain the messages alike is right cannot be told,
   /// and the calmer one is the better bet for the mean; the deviation answers for the other.
   static void lean(const Row& weight, Row& leaning) noexcept {
@@ -154,13 +154,16 @@ class Evidence {
   }
   ();
 
+  /// Each model against the calmer one beside it. Where a wander is just too slow to be seen, 3
+  /// sigma held 96 to 98 % of the errors without it.
+  static constexpr double kLean = 1.7;
   static constexpr Row kLeaning = []() constexpr {
     Row row{};
     for (std::size_t i = 0; i < kSize; ++i) {
       const double places = Grid::places_from_start(i);
       row[i] = 1.0;
-      for (double k = 0.0; k < places; ++k) row[i] *= Grid::kLean;
-      for (double k = 0.0; k > places; --k) row[i] /= Grid::kLean;
+      for (double k = 0.0; k < places; ++k) row[i] *= kLean;
+      for (double k = 0.0; k > places; --k) row[i] /= kLean;
     }
     return row;
   }

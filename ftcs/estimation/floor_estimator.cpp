@@ -16,8 +16,6 @@ namespace {
 /// Share of messages before the floor. Only a broken stamp, or a clock that
 /// changed, makes one.
 constexpr double kEarly = 1e-5;
-constexpr double kLn2Pi = 1.8378770664093453;
-constexpr double kLeastLogDensity = -700.0;
 /// Memories in messages: of the share at the floor, of the same for a load that
 /// has just changed, and of the noise there.
 constexpr double kShareMemory = 400.0;
@@ -96,14 +94,14 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
   const bool late = in.centred[best_] > 0.0;
   said_ = in.log_density[best_];
   testimony_ = {
-      quick_exp(std::max(log_normal(in.distance[best_], in.log_variance[best_]), kLeastLogDensity)),
+      quick_exp(std::max(log_normal(in.distance[best_], in.log_variance[best_]), kLeastExponent)),
       0.0,
       path.share,
       path.recent_share,
       late,
       late && std::min(path.share, path.recent_share) < kWaitsAreUsual};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
-                            : (1.0 - credit) * quick_exp(std::max(said_, kLeastLogDensity));
+                            : (1.0 - credit) * quick_exp(std::max(said_, kLeastExponent));
   const double s2 = scale_ * scale_;
   gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];
   watch_jumps(seen, path, in);
@@ -132,7 +130,7 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
       const double reach = std::max(-nu, 3.0 * std::sqrt(in.variance[i + lane]));
       other[lane] = nu > 0.0 ? (1.0 - path.share) * path.waits.at(nu) : kEarly / (10.0 * reach);
     }
-    const V log_density = larger<V>(load<V>(&in.log_density[i]), V{} + kLeastLogDensity);
+    const V log_density = larger<V>(load<V>(&in.log_density[i]), V{} + kLeastExponent);
     const V normal = path.share * quick_exp(log_density);
     const V density = normal + other;
     const V credit = normal / density;
@@ -156,7 +154,7 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
     const double nu = in.centred[best_];
     const double size = std::max(std::abs(nu), 3.0 * std::sqrt(in.variance[best_]));
     const double outlier = (nu > 0.0 ? outliers.late : outliers.early) / (10.0 * size);
-    log_density = quick_log(quick_exp(std::max(log_density, kLeastLogDensity)) + outlier);
+    log_density = quick_log(quick_exp(std::max(log_density, kLeastExponent)) + outlier);
   }
   jumps_.follow({seen, shape, scale_, outliers, process_, true, true, bank_.estimate(best_),
                  distance, log_density});
@@ -232,10 +230,8 @@ void FloorEstimator::choose() noexcept {
 }
 
 void FloorEstimator::mix() noexcept {
-  Evidence<FloorGrid>::Row doubt;
-  Evidence<FloorGrid>::lean(weight_, doubt);
-  mixed_ = bank_.mixture(weight_, doubt, scale_);
-  process_ = bank_.mean_noise(doubt);
+  mixed_ = bank_.mixture(weight_, weight_, scale_);
+  process_ = bank_.mean_noise(weight_);
 }
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include "ftcs/estimation/line_sums.h"
 #include "ftcs/estimation/quick_math.h"
@@ -146,7 +147,7 @@ class Fit {
   void score(const Counts& count, Candidate& candidate) const noexcept {
     const double log_unit = quick_log(kLogRange * smallest_);
     const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
-      return -((static_cast<double>(octave) - 0.5) * quick::kLn2 + log_unit);
+      return -((static_cast<double>(octave) - 0.5) * std::numbers::ln2 + log_unit);
     };
     double beyond = 0.0;
     for (int b = 1; b < kOctaves; ++b) beyond += count[static_cast<std::size_t>(b)] * unknown(b);

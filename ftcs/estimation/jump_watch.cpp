@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/estimation/jump_watch.h"
 
-#include <algorithm>
 #include <cmath>
-
-#include "ftcs/estimation/elementary.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -21,18 +18,9 @@ constexpr double kCertainOffset = 13.0;
 constexpr double kCertainDelay = 40.0;
 /// One direction alone: late packets look like a jump of the offset, too.
 constexpr double kCertainAlone = 30.0;
-/// Jump or change of rate? Where messages follow each other closely both
-/// explain the same, and only what is usual remains to decide: oscillators do
-/// not change by more than some twenty times the noise in a cycle, clocks are
-/// stepped by anything. A factor of two around that counts six nats.
-constexpr double kUsualRate = 20.0;
-constexpr double kSteepness = 8.0;
-constexpr double kMostPreference = 10.0;
 /// Share of late messages above which one of them says nothing of a jump's
 /// size.
 constexpr double kCommon = 0.2;
-/// Cycles since the last message: the rate may have changed well before it.
-constexpr double kUnnoticed = 0.5;
 
 }  // namespace
 
@@ -48,9 +36,6 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
   Estimate jumped = believed;
   (jumped_ == Of::kOffset ? jumped.xx : jumped.dd) += size * size;
   filter_.start(jumped);
-  const double rate = size / (std::abs(message.seen.elapsed) + kUnnoticed);
-  preference_ =
-      std::clamp(kSteepness * portable_log(rate / kUsualRate), -kMostPreference, kMostPreference);
   lead_ = kPrior;
   two_way_ = message.two_way;
   alive_ = size * size < ModelBank<OneModel>::kLargestVariance;
@@ -103,7 +88,7 @@ void JumpWatch::follow(const JumpMessage& message) noexcept {
 
 JumpWatch::Verdict JumpWatch::judge(double rival) const noexcept {
   const JumpHypothesis& best = leading();
-  if (!best.alive() || best.lead() <= 0.0 || best.lead() + best.preference() <= rival) {
+  if (!best.alive() || best.lead() <= 0.0 || best.lead() <= rival) {
     return Verdict::kNothing;
   }
   return best.certain() ? Verdict::kJumped : Verdict::kWait;

@@ -42,9 +42,6 @@ class JumpHypothesis {
   [[nodiscard]] double lead() const noexcept { return lead_; }
   /// At the last message.
   [[nodiscard]] Estimate estimate() const noexcept { return filter_.estimate(0); }
-  /// Nats by which it is to be preferred to a change of rate that explains the
-  /// same.
-  [[nodiscard]] double preference() const noexcept { return preference_; }
   /// Enough speaks for it, and messages of both directions, where both come.
   [[nodiscard]] bool certain() const noexcept;
 
@@ -60,7 +57,6 @@ class JumpHypothesis {
 
   ModelBank<OneModel> filter_{};
   double lead_ = 0.0;
-  double preference_ = 0.0;
   Of jumped_;
   bool alive_ = false;
   bool two_way_ = false;

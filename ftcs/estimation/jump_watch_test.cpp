@@ -100,18 +100,6 @@ TEST(JumpWatch, forgets_an_outlier) {
   EXPECT_EQ(calm.forward(0.5, kPath), Verdict::kNothing);
 }
 
-TEST(JumpWatch, leaves_to_a_change_of_rate_what_is_as_usual_for_one) {
-  // 1 us, ten times the noise, within a cycle: one part per million at a
-  // second.
-  Calm small;
-  (void)small.message(Direction::kForward, 1.0, kPath - 1'000.0, 5.0);
-  EXPECT_EQ(small.message(Direction::kBackward, 0.01, -kPath - 1'010.0, 25.0), Verdict::kNothing);
-  // 20 us is not, although a rate would explain it as well.
-  Calm large;
-  (void)large.message(Direction::kForward, 1.0, kPath - 20'000.0, 5.0);
-  EXPECT_EQ(large.message(Direction::kBackward, 0.001, -kPath - 20'010.0, 25.0), Verdict::kJumped);
-}
-
 TEST(Lateness, late_in_both_directions_is_no_clock) {
   Lateness lateness;
   lateness.observe(0, true, 100.0);

@@ -36,7 +36,6 @@ constexpr double kShort = 1.0 / 64.0;
 constexpr double kLeastLogDensity = -600.0;
 /// Messages.
 constexpr std::uint8_t kLateMemory = 8;
-constexpr std::uint8_t kYoungFor = 16;
 
 }  // namespace
 
@@ -129,7 +128,6 @@ void LoadAwareEstimator<Grid>::start_floor() noexcept {
                     plain_.innovation_ns());
   lead_ = recent_lead_ = 0.0;
   explained_alone_ = 0;
-  young_ = kYoungFor;
   believed_ = true;
 }
 
@@ -152,7 +150,6 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     start_floor();
     return credit;
   }
-  if (young_ > 0 && --young_ > 0 && own < 0.5 && !floor_.testimony().late) floor_.unlock();
   bool agreed = false;
   if (floor_.adopted()) {
     explained_alone_ = 0;

@@ -97,8 +97,6 @@ class LoadAwareEstimator {
   PerDirection<double> learnt_part_{0.5, 0.5};  ///< q
   std::uint8_t explained_alone_ = 0;  ///< messages that the first picture explains, not the second
   std::uint8_t late_ = 0;             ///< messages for which a late one is remembered
-  std::uint8_t young_ =
-      0;  ///< messages in which an early one is the end of a floor from the first picture
   bool believed_ = false;
 };
 

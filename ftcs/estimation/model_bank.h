@@ -277,9 +277,6 @@ class ModelBank {
   /// not worth computing.
   static constexpr double kSuspicious = 4.0;
 
-  static constexpr double kLeastLogDensity = -700.0;
-  static constexpr double kLn2Pi = 1.8378770664093453;
-
   /// Queueing noise: slope, curvature and density of the late shape.
   static void judge_late(double noise, double s2, double tail, Innovations& out) noexcept {
     for (std::size_t i = 0; i < kSize; ++i) {
@@ -304,7 +301,7 @@ class ModelBank {
       const V size = larger<V>(magnitude(centred), 3.0 * root(load<V>(&out.variance[i])));
       const V outlier = probability / (10.0 * size);
       const V log_density = load<V>(&out.log_density[i]);
-      const V density = quick_exp(larger<V>(log_density, V{} + kLeastLogDensity));
+      const V density = quick_exp(larger<V>(log_density, V{} + kLeastExponent));
       const V mixed = density + outlier;
       const V near = V{} + kSuspicious;
       const V one = V{} + 1.0;

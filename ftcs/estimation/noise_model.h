@@ -44,10 +44,7 @@ struct FullGrid {
   static constexpr std::size_t kStart = 13;  ///< the model that is believed before any evidence
   static constexpr double kCalmFavour = 0.0;
   static constexpr std::size_t kFavoured = 7;  ///< believed a little more than its neighbours
-  /// Each model against the calmer one beside it, where the deviation is concerned. Where a wander
-  /// is just too slow to be seen, 3 sigma held 96 to 98 % of the errors without it.
-  static constexpr double kLean = 1.7;
-  static constexpr std::size_t kSudden = 25;  ///< from here on models explain any single message
+  static constexpr std::size_t kSudden = 25;   ///< from here on models explain any single message
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return static_cast<double>(i) - static_cast<double>(kStart);
   }
@@ -69,7 +66,6 @@ struct FloorGrid {
   static constexpr std::size_t kSize = 14;
   static constexpr std::size_t kStart = 6;
   static constexpr std::size_t kFavoured = 1;
-  static constexpr double kLean = 1.2;  ///< half of the models, two decades and more apart
   /// Twice nats for the one that stands for seven nearly constant ones of the
   /// full bank: 2 ln 7.
   static constexpr double kCalmFavour = 3.9;
@@ -101,7 +97,6 @@ struct SmallGrid {
   static constexpr std::size_t kStart = 1;
   static constexpr double kCalmFavour = 0.0;
   static constexpr std::size_t kFavoured = kSize;  // none
-  static constexpr double kLean = 1.7;
   static constexpr std::size_t kSudden = kSize;
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return static_cast<double>(i) - static_cast<double>(kStart);

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <numbers>
 
 #include "ftcs/estimation/lanes.h"
 
@@ -24,9 +25,18 @@ struct BitsOf<Pair> {
 template <class V>
 using Bits = typename BitsOf<V>::Type;
 
-inline constexpr double kLn2 = 0.6931471805599453;
+/// ln 2 in two parts: a multiple of the first by an integer of 11 bits is exact.
+inline constexpr double kLn2High = 0.693147180369123816490;
+inline constexpr double kLn2Low = 1.90821492927058770002e-10;
+inline constexpr double kRound =
+    6755399441055744.0;  ///< 1.5 2^52: what is added to it is rounded to an integer
+inline constexpr std::uint64_t kMantissa = 0x000FFFFFFFFFFFFFULL;
+inline constexpr std::uint64_t kSqrtHalf = 0x3FE6A09E667F3BCDULL;  ///< bits of sqrt(1/2)
 
 }  // namespace quick
+
+inline constexpr double kLn2Pi = 1.8378770664093453;  ///< of a normal density: ln(2 pi)
+inline constexpr double kLeastExponent = -700.0;      ///< of quick_exp
 
 /// Natural logarithm of a positive, finite, normal number; relative error of
 /// the argument below 1e-9.
@@ -36,8 +46,7 @@ inline constexpr double kLn2 = 0.6931471805599453;
 template <class V>
 [[nodiscard]] inline V quick_log(const V& x) noexcept {
   using Bits = quick::Bits<V>;
-  constexpr std::uint64_t kSqrtHalf = 0x3FE6A09E667F3BCDULL;  // bits of sqrt(1/2)
-  constexpr std::uint64_t kMantissa = 0x000FFFFFFFFFFFFFULL;
+  using quick::kMantissa, quick::kSqrtHalf;
   constexpr std::uint64_t kBias = 1023ULL << 52U;
   constexpr std::uint64_t kTwo52 = 0x4330000000000000ULL;  // bits of 2^52
   const Bits bits = std::bit_cast<Bits>(x) - kSqrtHalf;
@@ -49,7 +58,7 @@ template <class V>
   const V t = (m - 1.0) / (m + 1.0);
   const V u = t * t;
   const V series = 1.0 + u * (1.0 / 3 + u * (1.0 / 5 + u * (1.0 / 7 + u * (1.0 / 9))));
-  return exponent * quick::kLn2 + 2.0 * t * series;
+  return exponent * std::numbers::ln2 + 2.0 * t * series;
 }
 
 /// Exponential; relative error below 1e-8. Valid: |x| <= 700; beyond, any
@@ -60,10 +69,8 @@ template <class V>
 template <class V>
 [[nodiscard]] inline V quick_exp(const V& x) noexcept {
   using Bits = quick::Bits<V>;
-  constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: rounds to an integer in the mantissa
-  constexpr double kLn2High = 0.693147180369123816490;
-  constexpr double kLn2Low = 1.90821492927058770002e-10;
-  const V shifted = x * (1.0 / quick::kLn2) + kRound;
+  using quick::kLn2High, quick::kLn2Low, quick::kRound;
+  const V shifted = x * (1.0 / std::numbers::ln2) + kRound;
   const V n = shifted - kRound;
   const V r = x - n * kLn2High - n * kLn2Low;
   const V high = 1.0 / 120 + r * (1.0 / 720 + r * (1.0 / 5040));

@@ -29,9 +29,12 @@ class StampTicks {
   /// their advances since the message before, of the same direction, differ by
   /// more than half.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
-  /// Variance that the steps of both clocks' stamps leave open, ns^2.
-  [[nodiscard]] double variance_ns2() const noexcept {
-    return reference_tick_.variance_ns2() + free_running_tick_.variance_ns2();
+  /// Variance that the steps of both clocks' stamps leave open where messages
+  /// have noise of so much (rounding included, ns), ns^2.
+  [[nodiscard]] double hidden_ns2(double noise_ns) const noexcept {
+    const double rounding = reference_tick_.variance_ns2() + free_running_tick_.variance_ns2();
+    const double beside = std::max(0.0, noise_ns * noise_ns - rounding);
+    return reference_tick_.hidden_ns2(beside) + free_running_tick_.hidden_ns2(beside);
   }
   /// Noise that rounding makes in a message, ns: at least that of whole
   /// nanoseconds.

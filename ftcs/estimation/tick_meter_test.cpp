@@ -2,6 +2,9 @@
 // World: differences of timestamps that are multiples of a clock's step.
 #include "ftcs/estimation/tick_meter.h"
 
+#include <cmath>
+#include <random>
+
 #include <gtest/gtest.h>
 
 namespace ftcs::estimation {
@@ -38,6 +41,44 @@ TEST(TickMeter, repetitions_and_long_gaps_tell_nothing) {
   meter.observe(0);
   meter.observe(std::uint64_t{1} << 40U);
   EXPECT_DOUBLE_EQ(meter.variance_ns2(), 1e8 / 12.0);
+}
+
+TEST(TickMeter, noise_lets_averaging_see_what_rounding_hides) {
+  TickMeter meter;
+  meter.observe(800);
+  meter.observe(808);
+  EXPECT_DOUBLE_EQ(meter.variance_ns2(), 64.0 / 12.0);
+  EXPECT_DOUBLE_EQ(meter.hidden_ns2(0.0), 64.0 / 12.0);
+  // A third of a step: exp(-4 pi^2 / 9).
+  EXPECT_NEAR(meter.hidden_ns2(64.0 / 9.0), 64.0 / 12.0 * 0.01245, 1e-4);
+  EXPECT_LT(meter.hidden_ns2(100.0), 1e-20);
+}
+
+// Oracle: the mean of many rounded readings, at phases all over a step.
+TEST(TickMeter, what_is_hidden_is_what_a_long_mean_is_wrong_by) {
+  constexpr double kStep = 8.0;
+  TickMeter meter;
+  meter.observe(800);
+  meter.observe(808);
+  for (const double noise : {0.8, 1.6, 2.4}) {
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal(0.0, noise);
+    double squares = 0.0;
+    constexpr int kPhases = 40;
+    constexpr int kReadings = 20'000;
+    for (int k = 0; k < kPhases; ++k) {
+      const double truth = kStep * k / kPhases;
+      double sum = 0.0;
+      for (int i = 0; i < kReadings; ++i) {
+        sum += kStep * std::round((truth + normal(random)) / kStep) - truth;
+      }
+      squares += sum / kReadings * (sum / kReadings);
+    }
+    const double wrong = std::sqrt(squares / kPhases);
+    const double stated = std::sqrt(meter.hidden_ns2(noise * noise));
+    EXPECT_LT(wrong, stated) << noise;
+    EXPECT_GT(wrong, 0.7 * stated) << noise;
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "ftcs/estimation/wait_density.h"
 
 #include <algorithm>
+#include <numbers>
 
 #include "ftcs/estimation/quick_math.h"
 
@@ -18,7 +19,6 @@ constexpr double kEnough = 4.0;
 constexpr double kUnseen = 0.5;
 /// The table is made anew after so many messages.
 constexpr float kTell = 4.0F;
-constexpr double kRootTwo = 1.4142135623730951;
 
 }  // namespace
 
@@ -26,7 +26,7 @@ void WaitDensity::start(double mean_wait_ns) noexcept {
   double above = 1.0;  // part of the exponential beyond the cell's lower edge
   double edge = 1.0;
   for (float& count : count_) {
-    edge *= kRootTwo;
+    edge *= std::numbers::sqrt2;
     const double beyond = quick_exp(std::max(-edge / mean_wait_ns, -700.0));
     count = static_cast<float>(kStart * (above - beyond));
     above = beyond;
@@ -56,7 +56,7 @@ void WaitDensity::tabulate() noexcept {
   std::size_t open = 0;
   double upper = 1.0;
   for (std::size_t cell = 0; cell < kCells; ++cell) {
-    upper *= kRootTwo;
+    upper *= std::numbers::sqrt2;
     seen += static_cast<double>(count_[cell]);
     if (seen < kEnough) continue;
     const auto even = static_cast<float>(seen / (mass * (upper - begin)));
@@ -66,7 +66,8 @@ void WaitDensity::tabulate() noexcept {
   }
   // What is left lies in the last cells, as much in each.
   const double each = std::max(seen, kUnseen) / static_cast<double>(kCells - open);
-  for (double width = begin * (kRootTwo - 1.0); open < kCells; ++open, width *= kRootTwo) {
+  for (double width = begin * (std::numbers::sqrt2 - 1.0); open < kCells;
+       ++open, width *= std::numbers::sqrt2) {
     density_[open] = static_cast<float>(each / (mass * width));
   }
 }
