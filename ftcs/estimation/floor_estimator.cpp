@@ -298,6 +298,19 @@ void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<
   take_from(bank, evidence, scale);
 }
 
+/// Its level is known by repetition, which is proof enough.
+void FloorEstimator::lower(Direction direction, double ns, double share) noexcept {
+  Path& path = paths_[direction];
+  path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
+  certainty_ = kProven;
+  const double sign = sign_of(direction);
+  bank_.for_each([=](Estimate& e) {
+    e.x -= sign * ns / 2.0;
+    e.d -= ns / 2.0;
+  });
+  mix();
+}
+
 /// The line's noise includes what the oscillator did meanwhile. Heard once
 /// more, in order, the messages at the floor tell the two apart.
 void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {

@@ -62,6 +62,9 @@ class FloorEstimator {
   /// floor, should messages wait from now on. `wait`: of the first that did, ns.
   void start_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence, double scale,
                   const PerDirection<double>& noise, double wait) noexcept;
+  /// Just started so: the floor of one direction is `ns` lower, and a `share` of
+  /// its messages is there.
+  void lower(Direction direction, double ns, double share) noexcept;
   /// What is followed is not the floor: to be found anew.
   void unlock() noexcept { locked_ = false; }
   /// Messages wait, as others see it.

@@ -121,14 +121,29 @@ bool LoadAwareEstimator<Grid>::begins_to_wait(double credit) noexcept {
 }
 
 template <class Grid>
-void LoadAwareEstimator<Grid>::start_floor() noexcept {
+void LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
   const PerDirection<double> noise{plain_.noise_ns(Direction::kForward),
                                    plain_.noise_ns(Direction::kBackward)};
-  floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise,
-                    plain_.innovation_ns());
+  floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise, wait);
   lead_ = recent_lead_ = 0.0;
   explained_alone_ = 0;
   believed_ = true;
+}
+
+/// The first picture is settled on messages that nearly all wait for the same, in one direction:
+/// what it knows, with that direction's lucky messages for its floor, is followed.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) noexcept {
+  if (floor_.locked() || !plain_.settled()) {
+    lucky_ = {};
+    return false;
+  }
+  lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), plain_.noise_ns(direction));
+  if (!lucky_.found(direction)) return false;
+  start_floor(lucky_.ns(direction));
+  floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
+  lead_ = recent_lead_ = kHeadStart;
+  return true;
 }
 
 template <class Grid>
@@ -147,9 +162,10 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double own = floor_.update(seen, plain_.estimate().y);
   const bool begins = begins_to_wait(credit);
   if (begins && !floor_.locked()) {
-    start_floor();
+    start_floor(plain_.innovation_ns());
     return credit;
   }
+  if (finds_lucky(direction_of(seen), credit)) return credit;
   bool agreed = false;
   if (floor_.adopted()) {
     explained_alone_ = 0;

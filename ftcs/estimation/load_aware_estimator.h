@@ -3,6 +3,7 @@
 
 #include "ftcs/estimation/estimator.h"
 #include "ftcs/estimation/floor_estimator.h"
+#include "ftcs/estimation/lucky_level.h"
 
 namespace ftcs::estimation {
 
@@ -86,12 +87,14 @@ class LoadAwareEstimator {
   [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
-  void start_floor() noexcept;
+  void start_floor(double wait) noexcept;
+  [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
 
   Estimator<Grid> plain_;
   FloorEstimator floor_{};
+  LuckyLevel lucky_{};
   double lead_ = 0.0;                           ///< nats, w by its long memory
   double recent_lead_ = 0.0;                    ///< by its short one
   PerDirection<double> learnt_part_{0.5, 0.5};  ///< q
