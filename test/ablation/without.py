@@ -85,10 +85,18 @@ def taken_out(mechanism, overlay):
         file.write(text.replace(mechanism["with"], mechanism["without"]))
 
 
-def run(program, arguments):
-    """Its exit code, and the limits and tests that failed."""
+def target_of(needed_by):
+    """What a row runs: ftcs, also where a tool of the project calls it, or a test."""
+    program = shlex.split(needed_by)[0]
+    return "ftcs" if program == "ftcs" or program.startswith("tools/") else f"bin/{program}"
+
+
+def run(needed_by, program):
+    """Its exit code with `program` as what it runs, and the limits and tests that failed."""
+    named, *arguments = shlex.split(needed_by)
+    command = [os.path.join(ROOT, named), program] if named.startswith("tools/") else [program]
     try:
-        ended = subprocess.run([program, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=900)
+        ended = subprocess.run([*command, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=900)
     except subprocess.TimeoutExpired:
         return None, "not ended after 900 s"
     said = ended.stdout + ended.stderr
@@ -98,18 +106,16 @@ def run(program, arguments):
 
 def passes(build, needed_by):
     """As the program is: what fails anyway shows nothing."""
-    program, *arguments = shlex.split(needed_by)
-    return run(os.path.join(build.folder, "ftcs" if program == "ftcs" else f"bin/{program}"), arguments)[0] == 0
+    return run(needed_by, os.path.join(build.folder, target_of(needed_by)))[0] == 0
 
 
 def examine(build, mechanism):
     """Whether what needs the mechanism fails without it, and what it says."""
     with tempfile.TemporaryDirectory() as overlay:
         taken_out(mechanism, overlay)
-        program, *arguments = shlex.split(mechanism["needed_by"])
-        target = "ftcs" if program == "ftcs" else f"bin/{program}"
+        target = target_of(mechanism["needed_by"])
         objects = {name: build.compile(name, overlay) for name in build.changed(mechanism["file"], target)}
-        code, missed = run(build.link(target, objects, overlay), arguments)
+        code, missed = run(mechanism["needed_by"], build.link(target, objects, overlay))
     return code == 1 and missed, missed or f"exit code {code}"
 
 
