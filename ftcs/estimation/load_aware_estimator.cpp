@@ -20,6 +20,9 @@ constexpr double kMost = 60.0;
 /// Memory of q, and how near to certainty it may come.
 constexpr double kPartMemory = 20.0;
 constexpr double kLeastPart = 0.02;
+/// A floor that has been out of sight for so long that its offset is known to
+/// no more than this part of the mean wait would take waits for the floor.
+constexpr double kUseful = 1.0 / 16.0;
 /// Sigma of the fit within which the two pictures agree.
 constexpr double kAgree = 3.0;
 /// Four messages that the first picture explains and the second does not, while
@@ -47,6 +50,11 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
 template <class Grid>
 double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
   return std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
+}
+
+template <class Grid>
+bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
+  return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), plain_noise_ns());
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -169,7 +177,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
-  if (floor_.locked() && lead <= -kMost) floor_.unlock();
+  if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
   believed_ = floor_.locked() && lead >= kDisbelieved && convinces && !overruled();
   if (!believed_) return credit;

@@ -84,6 +84,7 @@ class LoadAwareEstimator {
   void forget_floor() noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
   [[nodiscard]] bool overruled() const noexcept;
+  [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   void start_floor(double wait) noexcept;
