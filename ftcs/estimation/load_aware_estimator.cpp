@@ -134,12 +134,12 @@ void LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
 /// what it knows, with that direction's lucky messages for its floor, is followed.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) noexcept {
-  if (floor_.locked() || !plain_.settled()) {
+  if (believed_ || !plain_.settled()) {
     lucky_ = {};
     return false;
   }
   lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), plain_.noise_ns(direction));
-  if (!lucky_.found(direction)) return false;
+  if (floor_.locked() || !lucky_.found(direction)) return false;
   start_floor(lucky_.ns(direction));
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
   lead_ = recent_lead_ = kHeadStart;
@@ -179,7 +179,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
-  believed_ = floor_.locked() && lead >= kDisbelieved && convinces && !overruled();
+  believed_ = floor_.locked() && lead >= kDisbelieved && convinces && !overruled() &&
+              !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
 }

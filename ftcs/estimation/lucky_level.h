@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -46,6 +47,13 @@ class LuckyLevel {
     const double missing = share(direction) * sides_[opposite(direction)].without;
     return own.seen >= kEnough && 2 * own.seen < own.since && missing > kNoChance;
   }
+  /// Both directions have lucky messages, by the same early: the others all
+  /// wait alike, and no floor of one direction is to be followed.
+  [[nodiscard]] bool alike(double noise) const noexcept {
+    const double apart = static_cast<double>(sides_.forward.level - sides_.backward.level);
+    return std::min(sides_.forward.seen, sides_.backward.seen) >= kBoth &&
+           std::abs(apart) < kSame * noise;
+  }
   /// ns below what was believed.
   [[nodiscard]] double ns(Direction direction) const noexcept {
     return static_cast<double>(sides_[direction].level);
@@ -69,6 +77,8 @@ class LuckyLevel {
   static constexpr std::uint16_t kRarest = 48;
   /// Messages that should have been lucky: e^-10.
   static constexpr double kNoChance = 10.0;
+  /// At the levels of both directions: two coincidences.
+  static constexpr std::uint16_t kBoth = 2;
   /// Sigma.
   static constexpr double kSame = 4.0;
   static constexpr std::uint16_t kMost = 4096;

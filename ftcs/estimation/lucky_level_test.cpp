@@ -53,6 +53,21 @@ TEST(LuckyLevel, a_path_that_has_become_shorter_is_no_level) {
   EXPECT_EQ((World{1, 0}.found_after(9'000)), 0);
 }
 
+TEST(LuckyLevel, of_both_directions_alike_is_told_from_one_that_differs) {
+  const auto alike = [](double backward) {
+    LuckyLevel level;
+    for (int i = 1; i <= 60; ++i) {
+      const bool lucky = i % 20 == 0;
+      level.observe(Direction::kForward, !lucky, lucky ? kLucky : 0.0, kNoise);
+      level.observe(Direction::kBackward, !lucky, lucky ? backward : 0.0, kNoise);
+    }
+    return level.alike(kNoise);
+  };
+  EXPECT_TRUE(alike(kLucky + kNoise));
+  EXPECT_FALSE(alike(kLucky + 10.0 * kNoise));
+  EXPECT_FALSE(alike(-kLucky)) << "late";
+}
+
 TEST(LuckyLevel, tells_where_it_is_and_how_many_reach_it) {
   LuckyLevel level;
   for (int i = 1; i <= 400; ++i) {
