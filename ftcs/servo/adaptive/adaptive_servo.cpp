@@ -180,8 +180,8 @@ ServoSnapshot BasicAdaptiveServo<Grid>::describe(const Belief& belief,
   snapshot.rate_ratio = Rate::from_ratio(1.0 / (1.0 + belief.rate_deviation));
   snapshot.offset_gain = estimator_.gain();
   const double sigma = estimator_.offset_sigma_ns(belief.cycles);
-  const double noise = std::min(estimator_.noise_ns(Direction::kForward),
-                                estimator_.noise_ns(Direction::kBackward));
+  const double noise =
+      std::min(estimator_.noise_ns(Direction::kForward), estimator_.noise_ns(Direction::kBackward));
   snapshot.offset_sigma_ns = std::sqrt(sigma * sigma + ticks_.hidden_ns2(noise));
   snapshot.rate_sigma_ppb = estimator_.rate_sigma_ns() / meter_.interval_ns() * 1e9;
   snapshot.path_delay_sigma_ns = estimator_.delay_sigma_ns();
