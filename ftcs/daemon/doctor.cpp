@@ -271,6 +271,19 @@ diagnosis::PortSeen seen_by(platform::Kernel& kernel, PtpReceiver& port, WireWat
   return seen;
 }
 
+/// What was found, the answer that the comparison with another transmitter puts in doubt behind it.
+void add_findings(std::vector<diagnosis::Finding>& findings,
+                  std::vector<diagnosis::Finding> diagnosed,
+                  const std::optional<diagnosis::Finding>& comparison) {
+  if (comparison && comparison->in_doubt) findings.push_back(*comparison);
+  for (diagnosis::Finding& finding : diagnosed) {
+    // Beside a doubt it is no answer that the clock would lock.
+    const bool locked = finding.cause == diagnosis::Cause::kLocked;
+    if (!locked || findings.empty()) findings.push_back(std::move(finding));
+  }
+  if (comparison && !comparison->in_doubt) findings.push_back(*comparison);
+}
+
 }  // namespace
 
 Examination examine(platform::Kernel& kernel, const PtpOptions& given,
@@ -321,13 +334,7 @@ Examination examine(platform::Kernel& kernel, const PtpOptions& given,
   if (port.failure()) result.findings.push_back(failure(*port.failure()));
   const auto comparison =
       compare_with_another(kernel, options, log, identity->clock, port, talkers);
-  if (comparison && comparison->in_doubt) result.findings.push_back(*comparison);
-  for (diagnosis::Finding& finding : diagnosis::diagnose_all(seen)) {
-    // Beside a doubt it is no answer that the clock would lock.
-    const bool locked = finding.cause == diagnosis::Cause::kLocked;
-    if (!locked || result.findings.empty()) result.findings.push_back(std::move(finding));
-  }
-  if (comparison && !comparison->in_doubt) result.findings.push_back(*comparison);
+  add_findings(result.findings, diagnosis::diagnose_all(seen), comparison);
   return result;
 }
 
