@@ -48,6 +48,8 @@ template <std::size_t Capacity>
 class SecondOpinion {
  public:
   void push(const Observation& seen, double innovation) noexcept;
+  /// Whether all its places are taken.
+  [[nodiscard]] bool full() const noexcept { return size_ == Capacity; }
   /// How many innovations in a row, of either direction, hardly differ from
   /// their predecessor: noise is not like that.
   [[nodiscard]] int serial() const noexcept { return std::max(alike_[0], alike_[1]); }
@@ -102,6 +104,7 @@ template <>
 class SecondOpinion<0> {
  public:
   void push(const Observation&, double) noexcept {}
+  [[nodiscard]] bool full() const noexcept { return true; }
   [[nodiscard]] int serial() const noexcept { return 0; }
   [[nodiscard]] FreshFit consult(const OpinionQuestion&) const noexcept { return {}; }
   [[nodiscard]] LastMessages last() const noexcept { return {}; }
