@@ -80,8 +80,8 @@ TEST(Ablation, every_mechanism_has_a_world_that_needs_it) {
       "second opinion", "the start, one in ten early by 20 us", start, 100.0);
 
   LoadedPathSpec queue;
-  queue.traffic = {traffic(0.6, 1, 200.0), traffic(0.0)};
-  needs<Estimator<ablation::WithoutShapes>>("learnt shapes", "waits of 200 ns, forward alone",
+  queue.traffic = {traffic(0.6, 1, 400.0), traffic(0.0)};
+  needs<Estimator<ablation::WithoutShapes>>("learnt shapes", "waits of 400 ns, forward alone",
                                             queue, 100.0);
 
   LoadedPathSpec load;

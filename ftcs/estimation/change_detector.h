@@ -5,7 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/lanes.h"
 #include "ftcs/estimation/noise_model.h"
 
@@ -83,13 +85,15 @@ class ChangeDetector {
     if (winner == kNone) return {};
     const double latest = log_density[winner] - log_density[i];
     if (latest <= 0.0) return {};  // what was put off is over
-    const bool abrupt = latest > kAbrupt;
+    const bool abrupt = latest > kHint;
     const double before = static_cast<double>(sum(i, winner)) - latest;
-    const bool alone = before < (trust.one_suffices ? kSecond : kAbrupt);
+    const bool alone = before < (trust.one_suffices ? kSecond : kHint);
     if (!trust.sudden && (abrupt || winner >= kSudden)) return {};
     if ((alone || (abrupt && !trust.seconded)) && !trust.one_suffices) return {};
-    const double enough = (alone ? kAlone : kThreshold) * caution;
-    const double needed = abrupt ? enough : std::max(enough, kGradual);
+    const double enough = (alone ? kConvincing : kThreshold) * caution;
+    // What one message hints at must be followed at once; what has gathered over many is more often
+    // chance, and costs a calm model all that it knew.
+    const double needed = abrupt ? enough : std::max(enough, kSure);
     if (sum(i, winner) <= static_cast<float>(needed)) return {};
     for (std::size_t j = std::min(first_of(i), kLast); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
     return {winner, alone};
@@ -121,23 +125,16 @@ class ChangeDetector {
   }
 
   /// Nats. One false alarm per e^9.5 = 13,000 messages and pair of models at
-  /// most (Wald); measured, with what else is asked of a change: one that
-  /// mattered in two million.
+  /// most; measured, with what else is asked of a change: one that mattered in
+  /// two million. At ten, stamps that agree to the digit by luck are believed.
   static constexpr double kThreshold = 9.5;
-  /// What one message brings a good part of is a change, and must be followed
-  /// at once; what has gathered over many is more often chance, and costs a
-  /// calm model all that it knew.
-  static constexpr double kAbrupt = 5.0;
-  static constexpr double kGradual = 13.0;
-  /// What one message says alone, without so much from those before, is now and
-  /// then the far end of the noise: five sigma come once in two million.
-  static constexpr double kAlone = 11.0;
+  /// Nats: without so much from those before one message speaks alone.
   static constexpr double kSecond = 2.0;
   static constexpr std::size_t kSudden = Grid::kSudden;
 
-  static constexpr std::size_t kFour = 4;
+  static constexpr std::size_t kFour = sizeof(Quad) / sizeof(float);
   static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
-  static constexpr float kNever = -1e30F;
+  static constexpr float kNever = -std::numeric_limits<float>::max();
   static constexpr std::size_t kLast = kWidth - kFour;  ///< the group of four that is never spared
   static_assert(kSize <= 32);
   /// Read from place 4 - n on it spares the first n of a group.

@@ -117,7 +117,7 @@ TEST(ChangeDetector, early_on_it_asks_for_more) {
 }
 
 /// Two models with the same mean and variances 1 and 1.2, data from the first:
-/// exp(11) messages between false alarms is Wald's bound.
+/// exp(14) messages between false alarms is Wald's bound.
 TEST(ChangeDetector, false_alarms_are_rare) {
   Detector detector;
   std::mt19937_64 random(1);

@@ -5,14 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
-/// Beyond this many sigma on the late side the normal part no longer matters.
-constexpr double kFarLate = 8.0;
 constexpr double kSmallestCurvature = 1e-12;
 
 /// phi(u) / Phi(u), the inverse Mills ratio at -u.
@@ -36,7 +35,8 @@ Score late_score(double innovation, double spread, double tail) noexcept {
   }
   const double sigma = std::sqrt(spread);
   const double u = (innovation - spread / tail) / sigma;
-  if (u >= kFarLate) {
+  // Eight sigma late the normal part no longer matters.
+  if (u > 0.0 && u * u >= kEightSigma) {
     return {1.0 / tail, kSmallestCurvature / spread,
             -quick_log(tail) + spread / (2.0 * tail * tail) - innovation / tail};
   }

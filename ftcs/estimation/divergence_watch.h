@@ -6,11 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
 
 /// Counts the messages of each direction that nothing believed explains; each
-/// that it does explain takes one away. When several of both directions are
-/// left, and not all of them late, neither outliers nor a longer path nor a
+/// that it does explain takes one away. When four of both directions are
+/// left (with one outlier in ten, half of them early, once in 10^8 messages at
+/// most), and not all of them late, neither outliers nor a longer path nor a
 /// host that stood still can be the reason: the filters have diverged, and to
 /// start from nothing is quicker than to mend them.
 class DivergenceWatch {
@@ -20,7 +23,7 @@ class DivergenceWatch {
   void observe(std::size_t side, bool rejected, bool early) noexcept {
     std::uint8_t& left = left_[side];
     if (rejected) {
-      left = std::min<std::uint8_t>(static_cast<std::uint8_t>(left + 1), kEnough);
+      left = std::min<std::uint8_t>(static_cast<std::uint8_t>(left + 1), kFew);
       early_ = early_ || early;
       return;
     }
@@ -28,14 +31,10 @@ class DivergenceWatch {
     early_ = early_ && (left_[0] > 0 || left_[1] > 0);
   }
   [[nodiscard]] bool diverged() const noexcept {
-    return early_ && left_[0] >= kEnough && left_[1] >= kEnough;
+    return early_ && left_[0] >= kFew && left_[1] >= kFew;
   }
 
  private:
-  /// Four of each: with one outlier in ten, half of them early, once in 10^8
-  /// messages at most.
-  static constexpr std::uint8_t kEnough = 4;
-
   std::array<std::uint8_t, 2> left_{};
   bool early_ = false;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/time/per_direction.h"
 
 namespace ftcs::estimation {
@@ -24,7 +25,7 @@ class EarlyMessages {
   [[nodiscard]] bool observe(Direction direction, Message message) noexcept {
     Side& side = sides_[direction];
     ++side.messages;
-    if (side.messages >= kMemory) {
+    if (side.messages >= kLongestMemory) {
       side.messages /= 2;
       side.outliers /= 2;
     }
@@ -57,17 +58,17 @@ class EarlyMessages {
       if (sides_[direction].pending) changes_ = std::min<std::uint8_t>(changes_ + 1U, kMost);
       sides_[direction].pending = false;
     }
-    if (alone) doubted_ = kDoubted;
+    if (alone) doubted_ = kFewest;
   }
   /// Whether one message alone may change the rate.
   [[nodiscard]] bool one_suffices() const noexcept {
-    return changes_ >= kFewest + kPerOutlier * outliers_;
+    return changes_ >= kFewest + kFew * outliers_;
   }
   /// Probability of an early outlier.
   [[nodiscard]] double probability(Direction direction) const noexcept {
     const Side& side = sides_[direction];
     const double share = side.outliers / (static_cast<double>(side.messages) + kPrior);
-    return std::clamp(share, kLeast, kLargest);
+    return std::clamp(share, kHardlyEver, kOften);
   }
 
  private:
@@ -84,14 +85,9 @@ class EarlyMessages {
     side.outliers = static_cast<std::uint16_t>(side.outliers + 1U);
     outliers_ = std::min<std::uint8_t>(outliers_ + 1U, kMost);
   }
-  static constexpr std::uint16_t kMemory = 4000;
-  static constexpr double kPrior = 100.0;
-  static constexpr double kLeast = 1e-5;
-  static constexpr double kLargest = 0.2;
   static constexpr std::uint8_t kFewest = 2;
-  static constexpr std::uint8_t kPerOutlier = 4;
-  static constexpr std::uint8_t kMost = 40;
-  static constexpr std::uint8_t kDoubted = 2;
+  static constexpr std::uint8_t kMost = kOutlierMemory;
+  static constexpr double kPrior = kFew * kShortMemory;
 
   PerDirection<Side> sides_{};
   std::uint8_t changes_ = 0;
@@ -107,7 +103,7 @@ class NoEarlyMessages {
   [[nodiscard]] bool seconded_by(Direction, bool) const noexcept { return true; }
   void changed(bool) noexcept {}
   [[nodiscard]] bool one_suffices() const noexcept { return true; }
-  [[nodiscard]] double probability(Direction) const noexcept { return 1e-5; }
+  [[nodiscard]] double probability(Direction) const noexcept { return kHardlyEver; }
 };
 
 }  // namespace ftcs::estimation

@@ -6,48 +6,35 @@
 #include <cmath>
 #include <new>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
 namespace {
 
-/// Start of offset (beyond the first reading), rate and delay, in units of s
-/// and s per cycle: wide enough to be forgotten with the first message that
-/// sees them.
-constexpr double kOffsetPrior = 4e10;
-constexpr double kRatePrior = 1e10;
-constexpr double kDelayPrior = 1e10;
-/// Four and a half sigma, squared: noise does so once in three hundred thousand
-/// messages.
-constexpr double kFarOff = 20.0;
-/// Messages after which each of these may begin; before, every prediction is
-/// still prior.
+/// Messages after which evidence counts, and noise may be learnt; before,
+/// predictions are mostly prior.
 constexpr std::uint32_t kEvidenceFrom = 3;
-constexpr std::uint32_t kMixFrom = 4;
-constexpr std::uint32_t kJudgeFrom = 6;
 constexpr std::uint32_t kLearnFrom = 16;
-constexpr std::uint32_t kYoung = 100;
+/// Until then a change of the rate voids what was learnt, and nothing is settled.
+constexpr std::uint32_t kYoung = kFew * kShortMemory;
 /// The second opinion costs more than everything else: always early, and where
 /// what was known has just been forgotten; later every so often.
-constexpr std::uint32_t kOpinionOften = 32;
-constexpr std::uint8_t kOpinionPeriod = 4;
-constexpr std::uint8_t kOpinionWhile = 16;
+constexpr std::uint8_t kOpinionOften = 32;
 /// Residuals this many times below the innovations are not chance: with f
 /// degrees of freedom the probability of such luck is about (f / 2 k^2)^(f/2) /
-/// Gamma(f/2 + 1), below 1e-6 with sixteen messages. Filters that have only
-/// just started again have less to lose.
+/// Gamma(f/2 + 1), below 1e-6 with sixteen messages.
 constexpr double kContradiction = 10.0;
-constexpr double kYoungContradiction = 5.0;
+/// Filters that have only just started again have less to lose.
+constexpr double kYoungContradiction = kContradiction / 2.0;
 /// Filters that are settled and reject nothing are asked a million times, and a quarter of the
 /// messages is left out: ten times comes by luck once in a quarter of a million messages.
-constexpr double kSettledContradiction = 20.0;
-/// Rejections in a row of one direction, or innovations that hardly differ,
-/// after which it is asked every time for a while.
-constexpr int kSurprises = 3;
+constexpr double kSettledContradiction = 2.0 * kContradiction;
 
 }  // namespace
 
 template <class Grid>
 bool Estimator<Grid>::observable() const noexcept {
-  return two_way() || known_delay().known() || count_ > kMixFrom;
+  return two_way() || known_delay().known() || count_ > kFew;
 }
 
 template <class Grid>
@@ -73,9 +60,9 @@ void Estimator<Grid>::expect(const RatePrior& rate, double noise_ns) noexcept {
 template <class Grid>
 void Estimator<Grid>::begin(std::size_t side) noexcept {
   Estimate start;
-  start.xx = kOffsetPrior;
+  start.xx = kUnknown;
   start.y = mixed_.y;
-  start.yy = mixed_.yy > 0.0 ? mixed_.yy : kRatePrior;
+  start.yy = mixed_.yy > 0.0 ? mixed_.yy : kUnknown;
   if (const KnownDelay known = known_delay(); known.known()) {
     start.d = known.mean_ns;
     start.dd = known.sigma_ns * known.sigma_ns / (scale_ * scale_);
@@ -95,7 +82,7 @@ void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
   if (seen_[side]) return;
   seen_[side] = true;
   const double first_sign = side == 0 ? -1.0 : 1.0;  // of the other direction
-  if (pinned_) unpin_delay(first_sign, kDelayPrior);
+  if (pinned_) unpin_delay(first_sign, kUnknown);
 }
 
 template <class Grid>
@@ -152,13 +139,12 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
   connect_second_direction(side);
   ++count_;
   ++since_change_;
-  if (!bank_.predict(elapsed, best_) && count_ > kMixFrom) {
+  if (!bank_.predict(elapsed, best_) && count_ > kFew) {
     restart();
     return 0.0;
   }
   const OutlierPrior outliers{gate_.late_outliers(side), early_.probability(direction_of(seen))};
-  const Innovations innovations =
-      bank_.judge(seen, shape_[side], scale_, outliers, count_ > kMixFrom);
+  const Innovations innovations = bank_.judge(seen, shape_[side], scale_, outliers, count_ > kFew);
   if (count_ > kLearnFrom) {
     jumps_.follow({seen, shape_[side], scale_, outliers, process_, two_way(), delay_free(),
                    bank_.estimate(best_), innovations.distance[best_],
@@ -181,7 +167,7 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     // message as an outlier would otherwise gather no squares and look perfect.
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
-  if (count_ > kJudgeFrom) heed(seen, innovations);
+  if (count_ > kRepeated) heed(seen, innovations);
   if (follow_gate(side, credit, innovation)) {
     if (count_ == 0 || diverged_) return 0.0;
     hear_again(seen, outliers);
@@ -224,7 +210,7 @@ void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
   }
   if (count_ > kLearnFrom) {
     const NoiseSample sample{innovation, innovations.predicted[best_], robust_scale_,
-                             since_change_ > 8};
+                             since_change_ > kLately};
     if (learner_[side].learn(sample, shape_[side])) {
       const auto taken = static_cast<std::uint32_t>(learner_[side].count());
       const std::size_t other = 1 - side;
@@ -246,10 +232,11 @@ template <class Grid>
 template <class Grid>
 void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innovation) noexcept {
   second_opinion_.push(seen, innovation);
-  if (gate_.most_rejected() >= kSurprises || second_opinion_.serial() >= kSurprises)
-    surprise_ = kOpinionWhile;
+  // So many rejections in a row of one direction, or innovations that hardly differ.
+  if (std::max(gate_.most_rejected(), second_opinion_.serial()) >= kRepeated / 2)
+    surprise_ = kOpinionOften;
   const bool fresh = count_ <= kOpinionOften || evidence_.messages() < kOpinionOften;
-  const bool due = fresh || count_ % kOpinionPeriod == 0 || surprise_ > 0;
+  const bool due = fresh || count_ % kFew == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
   const bool young = fresh && second_opinion_.full();
@@ -290,7 +277,7 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   second_opinion_.adopt(start);
   surprise_ = 0;
   surprise_level_ = 1.0;
-  count_ = kJudgeFrom;
+  count_ = kRepeated;
 }
 
 template <class Grid>
@@ -335,7 +322,7 @@ bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innova
     restart();
     return true;
   }
-  const bool certain = verdict == Gate::Verdict::kCertain;
+  const bool certain = verdict == Gate::Verdict::kOpenAlone;
   const bool delay_free = this->delay_free();
   const bool clock = !delay_free || certain || lateness_.speaks_of_clock();
   bank_.for_each([=](Estimate& e) {
@@ -347,7 +334,7 @@ bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innova
 
 template <class Grid>
 void Estimator<Grid>::choose() noexcept {
-  if (count_ > kMixFrom && evidence_.messages() > 0.0) {
+  if (count_ > kFew && evidence_.messages() > 0.0) {
     best_ = evidence_.weigh(weight_);
     return;
   }

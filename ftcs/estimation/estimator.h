@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/change_detector.h"
 #include "ftcs/estimation/delay_shape.h"
 #include "ftcs/estimation/early_messages.h"
@@ -175,7 +176,7 @@ class Estimator {
   float said_ = 0.0F;          ///< ln density of the last message
   double scale_ = 100.0;
   double robust_scale_ = 100.0;
-  double least_noise_ = 1e-4;
+  double least_noise_ = kLeastNoise;
   float gain_ = 1.0F;
   float innovation_ = 0.0F;      ///< of the last message
   double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations

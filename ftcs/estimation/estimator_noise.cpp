@@ -4,25 +4,22 @@
 #include <array>
 #include <cmath>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/estimator.h"
 #include "ftcs/measurement/order_statistic.h"
 
 namespace ftcs::estimation {
 namespace {
 
-/// Six messages: short enough for the three or four that follow a change, long
+/// Eight messages: short enough for the three or four that follow a change, long
 /// enough not to follow the noise. Its usual fluctuation stays below 1.6.
-constexpr double kSurpriseShare = 1.0 / 6.0;
+constexpr double kSurpriseShare = 1.0 / kLately;
 constexpr double kUsualSurprise = 1.6;
-constexpr double kSurpriseLimit = 100.0;
-/// Variances of both directions that differ by less are of one kind of load.
-constexpr double kAlike = 4.0;
 /// The sharpest shape tried has a normal part of a seventh of the tail. Where
 /// that is the best shape the true edge is anything between that soft and as
 /// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
 /// late (measured). Taken back is the middle; what is open is as much.
 constexpr double kEdgeBias = 0.027;
-constexpr double kFloorDoubt = 0.03;
 constexpr double kSharpest = 0.97;
 
 bool sharp(const DelayShape& shape) noexcept {
@@ -43,7 +40,7 @@ std::size_t index_of(Direction direction) noexcept {
 /// directions at once. One that alone took its noise for a queue would move the
 /// offset by half a tail.
 bool alike(double variance, double other) noexcept {
-  return std::max(variance, other) < kAlike * std::min(variance, other);
+  return std::max(variance, other) < kMuch * std::min(variance, other);
 }
 
 /// Geometric mean of the standard deviations of one or both directions, of the
@@ -83,8 +80,8 @@ void Estimator<Grid>::follow_scale() noexcept {
   if (residuals_.size() > 0) {
     robust_scale_ = std::max(least_noise_, kMadToSigma * residuals_.median());
   }
-  if (evidence_.messages() > 4.0 &&
-      evidence_.mean_square(best_) > 9.0 * robust_scale_ * robust_scale_) {
+  if (evidence_.messages() > kFew &&
+      evidence_.mean_square(best_) > kThreeSigma * robust_scale_ * robust_scale_) {
     // Old gross errors are all that the evidence tells. The model that has
     // coped is right by now; without evidence any other might be chosen.
     evidence_.forget();
@@ -162,9 +159,9 @@ void Estimator<Grid>::adopt_shapes() noexcept {
 /// counts as far as outliers are not what one expects on this path.
 template <class Grid>
 void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
-  const double normalised = std::min(innovations.distance[best_], kSurpriseLimit);
+  const double normalised = std::min(innovations.distance[best_], kEightSigma);
   const double credit = innovations.credit[best_];
-  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / Gate::kOutlierStart);
+  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / kNowAndThen);
   const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);
   surprise_level_ += kSurpriseShare * (level - surprise_level_);
 }
@@ -181,7 +178,7 @@ double Estimator<Grid>::widening() const noexcept {
 template <class Grid>
 double Estimator<Grid>::floor_doubt_ns() const noexcept {
   const double share = two_way() ? 0.5 : 1.0;
-  const double known = kFloorDoubt * (shape_[0].tail - (two_way() ? 1.0 : -1.0) * shape_[1].tail);
+  const double known = kEdgeBias * (shape_[0].tail - (two_way() ? 1.0 : -1.0) * shape_[1].tail);
   const double soft = edge_width(shape_[0]) - (two_way() ? 1.0 : -1.0) * edge_width(shape_[1]);
   const double ahead = learner_[0].tail_doubt() * shape_[0].tail;
   const double back = learner_[1].tail_doubt() * shape_[1].tail;

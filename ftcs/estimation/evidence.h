@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/lanes.h"
 #include "ftcs/estimation/noise_model.h"
 #include "ftcs/estimation/quick_math.h"
@@ -35,7 +37,7 @@ class Evidence {
       store(&logs_[i], load<V>(&logs_[i]) + credit * (load<V>(&log_variance[i]) - log_s2));
     }
     messages_ += credit;
-    if (messages_ > kMemory) shrink();
+    if (messages_ > kLongestMemory) shrink();
   }
   void forget() noexcept { *this = Evidence{}; }
   /// What another bank has heard of the same models, which stand there at
@@ -60,8 +62,8 @@ class Evidence {
   [[nodiscard]] std::size_t weigh(Row& weight) const noexcept {
     Row cost;
     const double per_message = 1.0 / messages_;
-    const V smallest = V{} + kSmallestSquare;
-    V lowest = V{} + kHighestCost;
+    const V smallest = V{} + std::numeric_limits<double>::min();
+    V lowest = V{} + std::numeric_limits<double>::max();
     V place{};  // of the lowest cost in each lane
     for (std::size_t i = 0; i < kSize; i += kStep) {
       const V square = larger<V>(load<V>(&squares_[i]) * per_message, smallest);
@@ -75,7 +77,7 @@ class Evidence {
     for (std::size_t i = 0; i < kSize; i += kStep) {
       const V behind = 0.5 * (load<V>(&cost[i]) - best_cost);
       V w{};
-      if (least(behind) < kHopeless) w = behind < kHopeless ? quick_exp(V{} - behind) : w;
+      if (least(behind) < kBeyondDoubt) w = behind < kBeyondDoubt ? quick_exp(V{} - behind) : w;
       store(&weight[i], w);
       sum += w;
     }
@@ -115,8 +117,8 @@ class Evidence {
     for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);
   }
   void shrink() noexcept {
-    const double keep = kMemory / messages_;
-    messages_ = kMemory;
+    const double keep = kLongestMemory / messages_;
+    messages_ = kLongestMemory;
     for (std::size_t i = 0; i < kSize; i += kStep) {
       store(&squares_[i], load<V>(&squares_[i]) * keep);
       store(&logs_[i], load<V>(&logs_[i]) * keep);
@@ -125,11 +127,6 @@ class Evidence {
 
   /// One innovation, normalised and squared, counts at most this much.
   static constexpr double kLimit = 12.0;
-  static constexpr double kMemory = 4000.0;
-  static constexpr double kSmallestSquare = 1e-30;
-  static constexpr double kHighestCost = 1e300;
-  /// Nats; a weight of e^-40 moves nothing.
-  static constexpr double kHopeless = 40.0;
   /// Twice nats per place behind the starting model: with three messages every
   /// model is as likely as the next, and the wildest would take the noise for
   /// motion. Forgotten after a dozen messages.

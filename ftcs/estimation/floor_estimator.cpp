@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/delay_shape.h"
 #include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/lanes.h"
@@ -13,47 +14,15 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Share of messages before the floor. Only a broken stamp, or a clock that
-/// changed, makes one.
-constexpr double kEarly = 1e-5;
-/// Memories in messages: of the share at the floor, of the same for a load that
-/// has just changed, and of the noise there.
-constexpr double kShareMemory = 400.0;
-constexpr double kRecentMemory = 25.0;
-constexpr double kNoiseMemory = 1000.0;
-/// Before so many the share of the fit is better.
-constexpr double kShareFrom = 20.0;
-constexpr double kLeastShare = 0.002;
-constexpr double kMostShare = 0.995;
-/// Share at the floor above which what is late is an outlier rather than one
-/// that waited, as others do.
-constexpr double kWaitsAreUsual = 0.85;
-/// Where nothing has waited so far.
-constexpr double kShareUnproven = 0.9;
-/// A square counts at most so many variances.
-constexpr double kSquareLimit = 60.0;
-/// Three sigma early, squared, and for how many messages it is remembered: late
-/// is nothing here.
-constexpr double kPlainlyEarly = 9.0;
-constexpr int kEarlyMemory = 8;
-constexpr double kUnlikely = 0.1;
-/// Nats: none at the floor for so long is no chance (1e-6).
-constexpr double kTooDry = 14.0;
-/// Messages at a floor that was found, those of the fit (at most ten) included.
+/// Messages at a floor that was found, those of the fit (all but two of them at
+/// most) included.
 constexpr double kProven = 12.0;
-/// Looks for another floor after an early message, after a dry run, after a
-/// jump.
-constexpr int kLooksEarly = 2;
-constexpr int kLooksDry = 1;
 /// Start of the filters that hear the members of a fit once more, in units of
 /// its noise.
-constexpr double kWideOffset = 1e4;
-constexpr double kWideRate = 1e2;
-constexpr int kForgottenAfter = 4;
+constexpr double kWide = 1e4;
 /// The noise of a line contains what the oscillator did; the filters tell the
 /// two apart.
-constexpr double kLeastPart = 0.05;
-constexpr double kMostPart = 1.5;
+constexpr double kMostPart = 2.0;
 
 double log_normal(double distance, double log_variance) noexcept {
   return -0.5 * (distance + log_variance + kLn2Pi);
@@ -99,7 +68,7 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
       path.share,
       path.recent_share,
       late,
-      late && std::min(path.share, path.recent_share) < kWaitsAreUsual};
+      late && std::min(path.share, path.recent_share) < kNearlyAll};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
                             : (1.0 - credit) * quick_exp(std::max(said_, kLeastExponent));
   const double s2 = scale_ * scale_;
@@ -127,8 +96,8 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
     V other;
     for (std::size_t lane = 0; lane < Bank::kStep; ++lane) {
       const double nu = in.centred[i + lane];
-      const double reach = std::max(-nu, 3.0 * std::sqrt(in.variance[i + lane]));
-      other[lane] = nu > 0.0 ? (1.0 - path.share) * path.waits.at(nu) : kEarly / (10.0 * reach);
+      other[lane] = nu > 0.0 ? (1.0 - path.share) * path.waits.at(nu)
+                             : kHardlyEver / any_size(nu, std::sqrt(in.variance[i + lane]));
     }
     const V log_density = larger<V>(load<V>(&in.log_density[i]), V{} + kLeastExponent);
     const V normal = path.share * quick_exp(log_density);
@@ -146,14 +115,14 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
 /// size. What is believed is asked under the same.
 void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                                  const Bank::Innovations& in) noexcept {
-  const OutlierPrior outliers{1.0 - path.share, kEarly};
+  const OutlierPrior outliers{1.0 - path.share, kHardlyEver};
   const DelayShape shape{path.variance / (scale_ * scale_), 0.0};
   const double distance = in.distance[best_];
   double log_density = log_normal(distance, in.log_variance[best_]);
-  if (distance > 4.0) {
+  if (distance > kThreeSigma) {
     const double nu = in.centred[best_];
-    const double size = std::max(std::abs(nu), 3.0 * std::sqrt(in.variance[best_]));
-    const double outlier = (nu > 0.0 ? outliers.late : outliers.early) / (10.0 * size);
+    const double outlier =
+        (nu > 0.0 ? outliers.late : outliers.early) / any_size(nu, std::sqrt(in.variance[best_]));
     log_density = quick_log(quick_exp(std::max(log_density, kLeastExponent)) + outlier);
   }
   jumps_.follow({seen, shape, scale_, outliers, process_, true, true, bank_.estimate(best_),
@@ -162,12 +131,12 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
 
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const bool early = in.centred[best_] < 0.0;
-  if (early && in.distance[best_] > kPlainlyEarly) {
-    early_ = kEarlyMemory;
+  if (early && in.distance[best_] > kThreeSigma) {
+    early_ = kLately;
   } else if (early_ > 0) {
     --early_;
   }
-  if (early && in.credit[best_] < kUnlikely) search_.alarm(kLooksEarly);
+  if (early && in.credit[best_] < kUnlikely) search_.alarm();
   const std::uint32_t overtaken = detector_.add(in.log_density);
   const auto jump = jumps_.judge(detector_.lead(best_));
   // Late messages that agree by chance or by the length of a frame are no jump:
@@ -178,7 +147,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
     bank_.start(jumps_.estimate());
     detector_.clear();
     jumps_.clear();
-    search_.alarm(kLooksEarly);
+    search_.alarm();
     return;
   }
   if (jump == JumpWatch::Verdict::kWait) return;
@@ -196,21 +165,21 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
   const double credit = in.credit[best_];
   const double nu = in.centred[best_];
   path.heard += 1.0;
-  if (path.heard > kShareFrom) {
-    const double rate = 1.0 / std::min(path.heard, kShareMemory);
-    path.share = std::clamp(path.share + rate * (credit - path.share), kLeastShare, kMostShare);
+  if (path.heard > kShortMemory) {
+    const double rate = 1.0 / std::min(path.heard, kLoadMemory);
+    path.share = std::clamp(path.share + rate * (credit - path.share), kSeldom, 1.0 - kSeldom);
   }
-  path.recent_share = std::clamp(path.recent_share + (credit - path.recent_share) / kRecentMemory,
-                                 kLeastShare, kMostShare);
+  path.recent_share = std::clamp(path.recent_share + (credit - path.recent_share) / kShortMemory,
+                                 kSeldom, 1.0 - kSeldom);
   if (credit > 0.01) {
     path.members += credit;
     const double own = path.variance / in.variance[best_];
-    const double square = std::min(nu * nu, kSquareLimit * in.variance[best_]) * own;
-    path.variance += credit / std::min(path.members, kNoiseMemory) * (square - path.variance);
+    const double square = std::min(nu * nu, kEightSigma * in.variance[best_]) * own;
+    path.variance += credit / std::min(path.members, kLongMemory) * (square - path.variance);
   }
   if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
   path.dry = credit < kUnlikely ? path.dry - quick_log(1.0 - path.share) : 0.0;
-  if (path.dry > kTooDry) search_.alarm(kLooksDry);
+  if (path.dry > kSure) search_.alarm();
 }
 
 bool FloorEstimator::proven() const noexcept {
@@ -219,7 +188,7 @@ bool FloorEstimator::proven() const noexcept {
 }
 
 bool FloorEstimator::dry() const noexcept {
-  return paths_.forward.dry + paths_.backward.dry > kTooDry;
+  return paths_.forward.dry + paths_.backward.dry > kSure;
 }
 
 void FloorEstimator::choose() noexcept {
@@ -258,13 +227,13 @@ void FloorEstimator::begin(double scale, double wait) noexcept {
   weight_.fill(0.0);
   best_ = FloorGrid::kStart;
   weight_[best_] = 1.0;
-  count_ = 8;
+  count_ = kLately;
   early_ = 0;
   locked_ = adopted_ = true;
 }
 
 void FloorEstimator::begin_path(Path& path, double share, double members) noexcept {
-  path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
+  path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
   path.variance = scale_ * scale_;
   path.members = members;
   path.heard = path.dry = 0.0;
@@ -281,7 +250,7 @@ void FloorEstimator::adopt(const FloorFit& fit) noexcept {
     const double entries = 1.0 / static_cast<double>(search_.stride());
     const double share =
         1.0 - portable_exp(entries * portable_log(1.0 - fit.noise[direction].share));
-    begin_path(paths_[direction], share, std::min(fit.members[direction], 10.0));
+    begin_path(paths_[direction], share, std::min(fit.members[direction], kProven - 2.0));
   }
   mix();
 }
@@ -292,7 +261,7 @@ void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<
   begin(scale, wait);
   certainty_ = 0.0;
   for (const Direction direction : kDirections) {
-    begin_path(paths_[direction], kShareUnproven, kNoiseMemory / 10.0);
+    begin_path(paths_[direction], kNearlyAll, kLongMemory / 10.0);
     paths_[direction].variance = noise[direction] * noise[direction];
   }
   take_from(bank, evidence, scale);
@@ -301,8 +270,8 @@ void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<
 /// Its level is known by repetition, which is proof enough.
 void FloorEstimator::lower(Direction direction, double ns, double share) noexcept {
   Path& path = paths_[direction];
-  path.share = path.recent_share = std::clamp(share, kLeastShare, kMostShare);
-  certainty_ = kProven;
+  path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
+  certainty_ = kCertain;
   const double sign = sign_of(direction);
   bank_.for_each([=](Estimate& e) {
     e.x -= sign * ns / 2.0;
@@ -320,8 +289,7 @@ void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
     if (heard == 0) {
       Estimate start = fit.estimate;
       start.x += start.y * time;
-      start.xx = start.dd = kWideOffset;
-      start.yy = kWideRate;
+      start.xx = start.dd = start.yy = kWide;
       start.xy = start.xd = start.yd = 0.0;
       bank_.start(start);
       last = time;
@@ -331,7 +299,7 @@ void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
     const Observation seen{sign_of(direction), 0.0, z};
     const Bank::Innovations in = bank_.judge(seen, {}, scale_, {}, false);
     bank_.correct(seen, scale_, in);
-    if (++heard > kForgottenAfter) evidence_.add(in.distance, in.log_variance, 1.0, scale_);
+    if (++heard > kFew) evidence_.add(in.distance, in.log_variance, 1.0, scale_);
   });
   if (heard == 0) {
     bank_.start(fit.estimate);
@@ -341,7 +309,7 @@ void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
   if (!(evidence_.messages() > 0.0)) return;
   best_ = evidence_.weigh(weight_);
   const double seen = std::sqrt(evidence_.mean_square(best_));
-  scale_ = std::clamp(seen, std::max(least_noise_, kLeastPart * scale_), kMostPart * scale_);
+  scale_ = std::clamp(seen, least_noise_, kMostPart * scale_);
 }
 
 void FloorEstimator::take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/change_detector.h"
 #include "ftcs/estimation/evidence.h"
 #include "ftcs/estimation/floor_search.h"
@@ -18,7 +19,7 @@ namespace ftcs::estimation {
 /// for nothing and is known to r ns; the others wait, and how long is learnt:
 ///
 ///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)       nu > 0
-///             early (nu < 0) with e / (10 max(|nu|, 3 sqrt S)) in place of the waits
+///             early (nu < 0) an error of any size, hardly ever, in place of the waits
 ///     credit c = w N / p,   slope c nu / S,   curvature c / S
 ///
 /// While w is not tiny this reaches the filter that knows which messages
@@ -133,7 +134,7 @@ class FloorEstimator {
   std::size_t best_ = FloorGrid::kStart;
   std::uint32_t count_ = 0;
   double scale_ = 100.0;
-  double least_noise_ = 1e-4;
+  double least_noise_ = kLeastNoise;
   double gain_ = 1.0;
   double said_ = 0.0;  ///< ln density of the last message
   double mean_wait_ = 0.0;

@@ -8,36 +8,18 @@
 #include <cstdint>
 #include <numbers>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/line_sums.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
-/// ln of the range over which a wait of unknown size lies.
-constexpr double kLogRange = 10.0;
-constexpr double kUnknownWaits = 0.1;
-constexpr double kEarly = 1e-4;
-/// Waits of unknown size are even below this part of the mean wait.
-constexpr double kEvenBelow = 0.125;
-constexpr double kFewest = 5.0;
 constexpr std::size_t kCandidates = 48;
 /// Cycles between the two messages of an edge, at least.
 constexpr double kShortestEdge = 0.5;
-/// Within the width of a floor lie so many messages at least, and it is at most
-/// this part of the mean height.
-constexpr double kFewestInside = 6.0;
-constexpr double kWidest = 0.25;
 constexpr int kRounds = 8;
-/// The floor must be this much sharper than the waits are long.
-constexpr double kSharp = 1.0 / 12.0;
-/// Share at the floor in the newest third of a window, at least, as part of
-/// that in all of it: a path that changed leaves its old floor behind.
-constexpr double kLasting = 0.3;
-constexpr double kFewestMembers = 3.0;
-constexpr double kClear = 0.75;
 constexpr double kRootTwoPi = 2.5066282746310002;
-constexpr double kSmallest = 1e-3;
 
 using Windows = PerDirection<RecordWindow>;
 
@@ -54,7 +36,7 @@ class Fit {
  public:
   Fit(const Windows& windows, double least_noise) noexcept
       : windows_(windows),
-        smallest_(std::max(least_noise, kSmallest)),
+        smallest_(std::max(least_noise, kLeastNoise)),
         total_(static_cast<double>(windows.forward.size + windows.backward.size)),
         base_(windows.forward[windows.forward.size - 1].z) {}
 
@@ -160,8 +142,8 @@ class Fit {
         beyond -= here * unknown(b);
         width *= 2.0;
       }
-      if (inside < kFewestInside || here == 0.0) continue;
-      if (width > kWidest * candidate.mean && b > 1) break;
+      if (inside < kRepeated || here == 0.0) continue;
+      if (width > kSmallPart * candidate.mean && b > 1) break;
       const double rest = total_ - inside;
       double likelihood = inside * quick_log(inside / (total_ * width));
       if (rest > 0.0) {
@@ -221,7 +203,7 @@ class Fit {
     }
     Estimate change;
     const bool enough =
-        fit.members.forward >= 1.5 && fit.members.backward >= 1.5 && sums.n >= kFewest;
+        fit.members.forward >= 1.5 && fit.members.backward >= 1.5 && sums.n >= kRepeated;
     if (!enough || !sums.solve(change)) return false;
     const double explained = change.x * sums.z + change.y * sums.tz + change.d * sums.sz;
     change.x += fit.estimate.x;
@@ -243,7 +225,7 @@ class Fit {
   void judge(FloorFit& fit) const noexcept {
     const double wait = fit.noise.forward.mean_wait;
     const double sigma = fit.sigma();
-    const double chosen = 1.5 * quick_log(std::max(2.718281828459045, wait / sigma));
+    const double chosen = 1.5 * quick_log(std::max(std::numbers::e, wait / sigma));
     PerDirection<double> speaks{};
     bool lasting = true;
     for (const Direction direction : kDirections) {
@@ -258,7 +240,7 @@ class Fit {
     } else {
       fit.evidence = ahead ? speaks.backward : speaks.forward;
     }
-    fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFewestMembers &&
+    fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFew &&
                 sigma < kSharp * wait;
   }
 
@@ -293,8 +275,9 @@ class Fit {
       recent_all += 1.0;
     }
     fit.members[direction] = members;
+    // A path that changed leaves its old floor behind: in the newest third there are fewer at it.
     lasting =
-        lasting && recent >= kLasting * recent_all * members / static_cast<double>(window.size);
+        lasting && recent >= kSmallPart * recent_all * members / static_cast<double>(window.size);
     return gained;
   }
 
@@ -316,14 +299,13 @@ class Fit {
 
 double FloorNoise::at_floor(double nu, double& density) const noexcept {
   const double ratio = nu / sigma;
-  const double exponent = std::max(-0.5 * ratio * ratio, -700.0);
+  const double exponent = std::max(-0.5 * ratio * ratio, kLeastExponent);
   const double normal = share * quick_exp(exponent) / (sigma * kRootTwoPi);
-  const double size = std::max(std::abs(nu), 3.0 * sigma);
-  double other = kEarly / (kLogRange * size);
+  double other = kHardlyEver / any_size(nu, sigma);
   if (nu > 0.0) {
-    const double exponential = quick_exp(std::max(-nu / mean_wait, -700.0)) / mean_wait;
-    const double unknown = 1.0 / (kLogRange * std::max(size, kEvenBelow * mean_wait));
-    other = (1.0 - share) * ((1.0 - kUnknownWaits) * exponential + kUnknownWaits * unknown);
+    const double exponential = quick_exp(std::max(-nu / mean_wait, kLeastExponent)) / mean_wait;
+    const double unknown = 1.0 / std::max(any_size(nu, sigma), kLogRange * kSmallPart * mean_wait);
+    other = (1.0 - share) * ((1.0 - kUnlikely) * exponential + kUnlikely * unknown);
   }
   density = normal + other;
   return normal / density;
@@ -331,11 +313,12 @@ double FloorNoise::at_floor(double nu, double& density) const noexcept {
 
 double FloorFit::offset_sigma_ns() const noexcept { return sigma() * std::sqrt(estimate.xx); }
 
-bool FloorFit::clear(Direction direction) const noexcept { return noise[direction].share > kClear; }
+bool FloorFit::clear(Direction direction) const noexcept {
+  return noise[direction].share > kNearlyAll;
+}
 
 FloorFit fit_floor(const PerDirection<RecordWindow>& windows, double least_noise) noexcept {
-  const auto fewest = static_cast<std::size_t>(kFewest);
-  if (std::min(windows.forward.size, windows.backward.size) < fewest) return {};
+  if (std::min(windows.forward.size, windows.backward.size) < kRepeated) return {};
   return Fit(windows, least_noise).run();
 }
 

@@ -12,7 +12,7 @@ namespace ftcs::estimation {
 ///     p(nu) = w N(nu; 0, sigma^2) + (1 - w) (0.9 Exp(nu; tau) + 0.1 U(nu))      nu > 0
 ///
 /// w is the share of messages that wait for nothing, tau the mean wait of the
-/// others, U log-uniform over e^10. Early (nu < 0) there is 1e-4 U in place of
+/// others, U log-uniform over e^10. Early (nu < 0) there is 1e-5 U in place of
 /// the waits.
 struct FloorNoise {
   double share = 0.5;
@@ -40,8 +40,7 @@ struct FloorFit {
   [[nodiscard]] double sigma() const noexcept { return noise.forward.sigma; }
   /// Standard deviation of the offset, ns.
   [[nodiscard]] double offset_sigma_ns() const noexcept;
-  /// Of most messages of this direction nothing is late: its floor needs no
-  /// proof.
+  /// Hardly any message of this direction is late: its floor needs no proof.
   [[nodiscard]] bool clear(Direction direction) const noexcept;
 };
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/time/per_direction.h"
 
 namespace ftcs::estimation {
@@ -14,7 +15,7 @@ namespace ftcs::estimation {
 /// One message as it is kept for a fit.
 struct RecordedMessage {
   double z = 0.0;          ///< ns, brought to the time below by the rate that was believed
-  std::uint32_t time = 0;  ///< units of FloorRecord::kTimeUnit, modulo 2^32
+  std::uint32_t time = 0;  ///< in 1 / RecordWindow::kUnitsPerCycle cycles, modulo 2^32
   float said = 0.0F;       ///< ln density that the filters gave it; 0: they were not there
 };
 
@@ -39,7 +40,8 @@ struct RecordWindow {
     first = first + 1 == capacity ? 0 : first + 1;
     --size;
   }
-  static constexpr double kUnitsPerCycle = 131072.0;  ///< 2^17: 32,768 cycles in 32 bits
+  /// 2^17: 32 bits hold eight of the longest gap.
+  static constexpr double kUnitsPerCycle = 4294967296.0 / (8.0 * kLongestGap);
 };
 
 /// Keeps one of every `stride` messages of each direction: the first that the
@@ -157,9 +159,6 @@ class FloorRecord {
 
  private:
   static_assert(Capacity <= 128);
-  /// Half of what 32 bits of time can tell apart.
-  static constexpr double kLongestGap = 4096.0;
-
   struct Side {
     std::array<RecordedMessage, Capacity> ring{};
     RecordedMessage best{};  ///< of the block that is under way

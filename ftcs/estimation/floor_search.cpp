@@ -2,29 +2,21 @@
 #include "ftcs/estimation/floor_search.h"
 
 #include <algorithm>
-#include <cmath>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
 /// Messages between two looks at first, and at most.
-constexpr std::uint32_t kShortestPause = 8;
+constexpr std::uint32_t kShortestPause = kLately;
 constexpr std::uint32_t kLongestPause = 256;
-constexpr std::size_t kShortestWindow = 8;
-constexpr std::size_t kFewestEntries = 6;
-constexpr std::size_t kMostStride = 64;
-/// Nats of evidence, after what the choice of the line is worth: e^10 false
-/// floors to one.
-constexpr double kCertain = 10.0;
-/// Nats by which it must explain the messages better than filters that follow a
-/// floor did; and it must lie so many sigma off, or know so many times more.
-constexpr double kGain = 20.0;
-constexpr double kOff = 5.0;
-/// An entry should be at the floor more often than not, and seldom twice.
-constexpr double kCoarseBelow = 0.35;
-constexpr double kFineAbove = 1.5;
+constexpr std::uint16_t kShortestWindow = kLately;
+constexpr std::size_t kMostStride = FloorSearch::Record::kCapacity / 2;
+/// Times the usual distance of two messages at the floor: an entry then mostly
+/// holds two of them.
+constexpr double kFineAbove = 2.0;
 
 }  // namespace
 
@@ -33,7 +25,7 @@ void FloorSearch::restart() noexcept {
   recent_.clear();
   messages_ = not_before_ = 0;
   pause_ = kShortestPause;
-  alarm_ = 0;
+  alarm_ = false;
   wanted_ = best_wanted_ = 0;
   has_rate_ = fresh_ = clear_ = false;
   rate_ = 0.0;
@@ -53,8 +45,6 @@ void FloorSearch::wake() noexcept {
   pause_ = kShortestPause;
   not_before_ = std::min(not_before_, messages_ + kShortestPause);
 }
-
-void FloorSearch::alarm(int scans) noexcept { alarm_ = std::max(alarm_, scans); }
 
 std::size_t FloorSearch::stride() const noexcept { return best_in_recent_ ? 1 : record_.stride(); }
 
@@ -77,7 +67,7 @@ PerDirection<RecordWindow> FloorSearch::windows(std::size_t wanted, bool recent)
 void FloorSearch::begin() noexcept {
   best_wanted_ = 0;
   scan_has_rate_ = clear_ = false;
-  const bool coarse_due = record_.stride() == 1 || fresh_ || alarm_ > 0;
+  const bool coarse_due = record_.stride() == 1 || fresh_ || alarm_;
   in_recent_ = !coarse_due;
   wanted_ = kShortestWindow;
   if (!in_recent_ && record_.stride() > 1) wanted_ = 2 * kShortestWindow;
@@ -96,11 +86,11 @@ bool FloorSearch::next_window() noexcept {
 
 /// Of the wanted length, or all there is.
 bool FloorSearch::holds_window() const noexcept {
-  const std::size_t longest = in_recent_ ? 64 : 128;
+  const std::size_t longest = in_recent_ ? Recent::kCapacity : Record::kCapacity;
   const std::size_t held =
       in_recent_ ? std::min(recent_.size(Direction::kForward), recent_.size(Direction::kBackward))
                  : std::min(record_.size(Direction::kForward), record_.size(Direction::kBackward));
-  return held >= kFewestEntries && wanted_ <= longest && wanted_ / 2U < held;
+  return held >= kShortestWindow && wanted_ <= longest && wanted_ / 2U < held;
 }
 
 void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
@@ -110,15 +100,14 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
     has_rate_ = scan_has_rate_ = true;
   }
   clear_ = clear_ || (fit.clear(Direction::kForward) && fit.clear(Direction::kBackward));
-  if (!fit.found || fit.evidence < kCertain) return;
+  if (!fit.found || fit.evidence < kConvincing) return;
   const double sigma = fit.offset_sigma_ns();
-  if (rival.there) {
+  if (rival.there) {  // it must explain more, and lie elsewhere or know more
     const double own = rival.offset_sigma * rival.offset_sigma;
     const double off = fit.estimate.x - rival.offset;
-    const double limit = kOff * kOff;
     const bool contradicts =
-        off * off > limit * (own + sigma * sigma) || own > limit * sigma * sigma;
-    if (fit.log_likelihood - fit.said < kGain || !contradicts) return;
+        off * off > kFiveSigma2 * (own + sigma * sigma) || own > kFiveSigma2 * sigma * sigma;
+    if (fit.log_likelihood - fit.said < kCertain || !contradicts) return;
   }
   if (best_wanted_ > 0 && best_.offset_sigma_ns() <= sigma) return;
   best_ = fit;
@@ -129,7 +118,7 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
 bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
   if (wanted_ == 0) {
     const bool due =
-        rival.there ? alarm_ > 0 : messages_ % kShortestPause == 0 && messages_ >= not_before_;
+        rival.there ? alarm_ : messages_ % kShortestPause == 0 && messages_ >= not_before_;
     if (!due) return false;
     begin();
   }
@@ -147,12 +136,12 @@ bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
 
 void FloorSearch::end(const Rival& rival) noexcept {
   wanted_ = 0;
-  if (alarm_ > 0) --alarm_;
+  alarm_ = false;
   if (best_wanted_ > 0) return;
   const auto stride = static_cast<double>(record_.stride());
   if (rival.there) {
     const double usual = 1.0 / std::min(rival.share.forward, rival.share.backward);
-    if (stride < kCoarseBelow * usual && record_.stride() < kMostStride) {
+    if (stride < kSmallPart * usual && record_.stride() < kMostStride) {
       record_.coarsen(rival.rate);
     } else if (stride > kFineAbove * usual) {
       record_.refine();
@@ -180,7 +169,7 @@ void FloorSearch::adopt() noexcept {
   record_.say(said);
   recent_.say(said);
   best_wanted_ = 0;
-  alarm_ = 0;
+  alarm_ = false;
   pause_ = kShortestPause;
 }
 

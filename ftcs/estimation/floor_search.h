@@ -38,9 +38,8 @@ class FloorSearch {
   void hear(const Record::Message& message, double elapsed) noexcept;
   /// Something is late, or early: look soon, and at everything.
   void wake() noexcept;
-  /// Filters that follow a floor are in doubt: look `scans` times at once.
-  void alarm(int scans) noexcept;
-  [[nodiscard]] bool alarmed() const noexcept { return alarm_ > 0; }
+  /// Filters that follow a floor are in doubt: look at once.
+  void alarm() noexcept { alarm_ = true; }
 
   /// Work of at most one window of full length. True: found() is to be adopted.
   [[nodiscard]] bool look(const Rival& rival, double least_noise) noexcept;
@@ -49,8 +48,8 @@ class FloorSearch {
   /// One message of so many makes an entry of the record that the fit is from.
   [[nodiscard]] std::size_t stride() const noexcept;
   /// The filters have started from it: calls hear(direction, cycles from now,
-  /// z) for the messages at its floor, in order of time, the last hundred at
-  /// most.
+  /// z) for the messages at its floor, in order of time, the last 64 of each
+  /// direction at most.
   template <class Hear>
   void each_member(Hear hear) const noexcept;
   /// Everything recorded is as the line that was found says.
@@ -78,7 +77,7 @@ class FloorSearch {
   std::uint32_t not_before_ = 0;
   std::uint32_t pause_ = 8;
   double rate_ = 0.0;
-  int alarm_ = 0;
+  bool alarm_ = false;
   std::uint16_t wanted_ = 0;       ///< length of the window that is next; 0: no scan is under way
   std::uint16_t best_wanted_ = 0;  ///< of the best fit
   bool in_recent_ = false;         ///< the scan is at the recent record
@@ -91,9 +90,10 @@ class FloorSearch {
 
 template <class Hear>
 void FloorSearch::each_member(Hear hear) const noexcept {
-  constexpr std::size_t kMost = 50;  // of each direction
   const auto window = windows(best_wanted_, best_in_recent_);
-  const auto skipped = [](const RecordWindow& w) { return w.size > kMost ? w.size - kMost : 0; };
+  const auto skipped = [](const RecordWindow& w) {  // of each direction
+    return w.size > Recent::kCapacity ? w.size - Recent::kCapacity : 0;
+  };
   PerDirection<std::size_t> k{skipped(window.forward), skipped(window.backward)};
   while (k.forward < window.forward.size || k.backward < window.backward.size) {
     const auto left = [&](Direction direction) { return k[direction] < window[direction].size; };

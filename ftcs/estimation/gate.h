@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/divergence_watch.h"
 
 namespace ftcs::estimation {
@@ -17,19 +18,15 @@ class Gate {
  public:
   enum class Verdict : std::uint8_t {
     kShut,
-    kOpen,      ///< what was believed of this direction is in doubt
-    kCertain,   ///< the same, and this message is to be heard once more: the
-                ///< other direction fits
-    kDiverged,  ///< nothing is as believed
+    kOpen,       ///< what was believed of this direction is in doubt
+    kOpenAlone,  ///< the same, and this message is to be heard once more: the
+                 ///< other direction fits
+    kDiverged,   ///< nothing is as believed
   };
-  /// Outliers that are expected before anything is known.
-  static constexpr double kOutlierStart = 0.03;
-
   /// Exponential mean of what was not believed.
   void learn(std::size_t side, double credit) noexcept {
     double& late = late_outliers_[side];
-    late =
-        std::clamp(late + kOutlierRate * ((1.0 - credit) - late), kFewestOutliers, kMostOutliers);
+    late = std::clamp(late + ((1.0 - credit) - late) / kOutlierMemory, kSeldom, kOften);
   }
   [[nodiscard]] double late_outliers(std::size_t side) const noexcept {
     return late_outliers_[side];
@@ -43,42 +40,29 @@ class Gate {
                                 std::uint32_t since_change) noexcept {
     std::uint8_t& rejected = rejected_[side];
     std::uint8_t& taken = taken_[side];
-    divergence_.observe(side, credit < kRejected, early);
-    if (credit >= kRejected) {
+    divergence_.observe(side, credit < kUnlikely, early);
+    if (credit >= kUnlikely) {
       rejected = 0;
-      taken = std::min<std::uint8_t>(static_cast<std::uint8_t>(taken + 1), kOnBadPath);
+      taken = std::min<std::uint8_t>(static_cast<std::uint8_t>(taken + 1), kLately);
       return Verdict::kShut;
     }
     if (divergence_.diverged()) return Verdict::kDiverged;
     ++rejected;
     const bool alone = rejected_[1 - side] == 0;  // a host that stands still makes both late
-    const bool good_path = late_outliers_[side] < kBadPath || since_change < kSettled;
-    const std::uint8_t enough = alone && good_path ? kInARow : kOnBadPath;
-    if (rejected < std::max(kAtLeast, std::min(enough, taken))) return Verdict::kShut;
+    // So many cannot all be outliers, fewer where a change has just been followed; nor can more
+    // than were ever taken.
+    const std::uint8_t enough = alone && since_change < kShortMemory ? kRepeated : kLately;
+    if (rejected < std::max(kFew, std::min(enough, taken))) return Verdict::kShut;
     const bool certain = alone && rejected >= enough;
     rejected = 0;
     divergence_ = {};
-    return certain ? Verdict::kCertain : Verdict::kOpen;
+    return certain ? Verdict::kOpenAlone : Verdict::kOpen;
   }
   /// A jump was followed: it explains what was unexplained before it.
   void explained() noexcept { divergence_ = {}; }
 
  private:
-  static constexpr double kOutlierRate = 0.02;
-  static constexpr double kFewestOutliers = 0.001;
-  static constexpr double kMostOutliers = 0.2;
-  static constexpr double kRejected = 0.1;
-  /// Rejections in a row of one direction that cannot all be outliers: where
-  /// the other one fits, and outliers are rare or a change has just been
-  /// followed; and elsewhere. Six of them have raised the learnt probability by
-  /// 0.11. Nor can more than were ever taken, from three on.
-  static constexpr std::uint8_t kInARow = 6;
-  static constexpr std::uint8_t kOnBadPath = 8;
-  static constexpr std::uint8_t kAtLeast = 3;
-  static constexpr double kBadPath = 0.12;
-  static constexpr std::uint32_t kSettled = 24;
-
-  std::array<double, 2> late_outliers_ = {kOutlierStart, kOutlierStart};
+  std::array<double, 2> late_outliers_ = {kNowAndThen, kNowAndThen};
   std::array<std::uint8_t, 2> rejected_{};  ///< in a row
   std::array<std::uint8_t, 2> taken_{};     ///< up to as many as would open the gate
   DivergenceWatch divergence_{};

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/time/timestamp_pair.h"
 
 namespace ftcs::estimation {
@@ -42,7 +43,8 @@ class IntervalMeter {
     if (forward || !forward_contradicts_) candidate_ns_ = elapsed;
     forward_contradicts_ = forward_contradicts_ || forward;
     doubt_ = static_cast<std::uint8_t>(doubt_ + (forward ? 2 : 1));
-    if (doubt_ < (known_ ? kEnough : kEnoughAtFirst)) return 1.0;
+    // Four forward messages: a gap or a burst now and then is no change of schedule.
+    if (doubt_ < (known_ ? kLately : kEnoughAtFirst)) return 1.0;
     const double factor = candidate_ns_ / interval_ns_;
     interval_ns_ = candidate_ns_;
     known_ = true;
@@ -78,9 +80,6 @@ class IntervalMeter {
   static constexpr double kShortestNs = 1e3;
   static constexpr double kTolerance = 3.0;
   static constexpr double kBaseline = 0.125;
-  /// Four forward messages: a gap or a burst now and then is no change of
-  /// schedule.
-  static constexpr int kEnough = 8;
   static constexpr int kEnoughAtFirst = 2;
 
   std::array<Side, 2> sides_{};

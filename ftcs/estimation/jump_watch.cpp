@@ -3,30 +3,17 @@
 
 #include <cmath>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
-namespace {
 
-/// An innovation below eight sigma needs no jump; squared.
-constexpr double kFar = 64.0;
-/// ln of the probability that a message brings a jump: one in a thousand. What
-/// counts is the certainty below; a rarer jump needs one more message.
-constexpr double kPrior = -7.0;
-/// Nats. No queue makes packets early, so that two messages, one of each
-/// direction, tell a jump of the offset from anything else. A longer path looks
-/// like two late packets, which are common.
-constexpr double kCertainOffset = 13.0;
-constexpr double kCertainDelay = 40.0;
-/// One direction alone: late packets look like a jump of the offset, too.
-constexpr double kCertainAlone = 30.0;
-/// Share of late messages above which one of them says nothing of a jump's
-/// size.
-constexpr double kCommon = 0.2;
-
-}  // namespace
-
+/// No queue makes packets early, so that two messages, one of each direction,
+/// tell a jump of the offset from anything else. A longer path looks like two
+/// late packets, which are common; so does a jump of the offset where one
+/// direction is all there is.
 bool JumpHypothesis::certain() const noexcept {
-  if (!two_way_) return lead_ > kCertainAlone;
-  return lead_ > (jumped_ == Of::kOffset ? kCertainOffset : kCertainDelay) && seen_[0] && seen_[1];
+  if (!two_way_) return lead_ > kBeyondDoubt;
+  return lead_ > (jumped_ == Of::kOffset ? kSure : kBeyondDoubt) && seen_[0] && seen_[1];
 }
 
 void JumpHypothesis::start(const JumpMessage& message) noexcept {
@@ -36,7 +23,7 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
   Estimate jumped = believed;
   (jumped_ == Of::kOffset ? jumped.xx : jumped.dd) += size * size;
   filter_.start(jumped);
-  lead_ = kPrior;
+  lead_ = -kHint;  // ln of the probability that a message brings one
   two_way_ = message.two_way;
   alive_ = size * size < ModelBank<OneModel>::kLargestVariance;
 }
@@ -58,19 +45,19 @@ void JumpHypothesis::judge(const JumpMessage& message) noexcept {
 /// A jump of the offset makes one direction early; where late messages are
 /// common its size is to be read from that one.
 bool JumpHypothesis::may_start(const JumpMessage& message) const noexcept {
-  if (message.distance < kFar) return false;
+  if (message.distance < kEightSigma) return false;
   const Estimate& e = message.believed;
   const bool early = message.seen.sign * (message.seen.z - e.x) - e.d < 0.0;
-  return early || jumped_ == Of::kDelay || message.outliers.late <= kCommon;
+  return early || jumped_ == Of::kDelay || message.outliers.late <= kOften;
 }
 
 void JumpHypothesis::follow(const JumpMessage& message) noexcept {
-  if (!alive_ && message.distance < kFar) return;  // almost always
+  if (!alive_ && message.distance < kEightSigma) return;  // almost always
   if (alive_) {
     predict(message);
     judge(message);
   }
-  if (message.distance < kFar) {
+  if (message.distance < kEightSigma) {
     if (lead_ <= 0.0) alive_ = false;
   } else if (may_start(message)) {
     JumpHypothesis afresh(jumped_);

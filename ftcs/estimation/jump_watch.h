@@ -47,8 +47,8 @@ class JumpHypothesis {
 
  private:
   struct OneModel {
-    static constexpr std::size_t kSize = 1;
-    static constexpr std::array<NoiseModel, kSize> kModels = {};
+    static constexpr std::array<NoiseModel, 1> kModels = {};
+    static constexpr std::size_t kSize = kModels.size();
   };
   [[nodiscard]] bool may_start(const JumpMessage& message) const noexcept;
   void start(const JumpMessage& message) noexcept;

@@ -74,7 +74,7 @@ TEST(JumpWatch, asks_more_of_one_direction_where_there_is_no_other) {
   EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
   EXPECT_NE(calm.forward(1.0, kPath + 20'000.0), Verdict::kJumped);
   Verdict last = Verdict::kNothing;
-  for (int i = 0; i < 3 && last != Verdict::kJumped; ++i)
+  for (int i = 0; i < 4 && last != Verdict::kJumped; ++i)
     last = calm.forward(1.0, kPath + 20'000.0);
   EXPECT_EQ(last, Verdict::kJumped);
 }

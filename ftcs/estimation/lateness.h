@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
 
 /// Remembers for a few messages whether those of each direction came late or
@@ -19,8 +21,8 @@ class Lateness {
     for (Side& each : sides_) {
       if (each.remembered > 0 && --each.remembered == 0) each.came = Came::kAsBelieved;
     }
-    if (distance < kPlain) return;
-    sides_[side] = {late ? Came::kLate : Came::kEarly, kMemory};
+    if (distance < kThreeSigma) return;
+    sides_[side] = {late ? Came::kLate : Came::kEarly, kLately};
   }
   /// Whether a clock that changed can have brought it, both directions being
   /// there.
@@ -35,8 +37,6 @@ class Lateness {
     Came came = Came::kAsBelieved;
     std::uint8_t remembered = 0;
   };
-  static constexpr double kPlain = 9.0;  ///< three sigma
-  static constexpr std::uint8_t kMemory = 8;
 
   std::array<Side, 2> sides_{};
 };

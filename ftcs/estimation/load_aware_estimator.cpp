@@ -4,38 +4,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
-/// Nats. One message counts at most kStep; a floor just found leads by what
-/// spoke for it, at most kHeadStart; above kBelieved it is followed until it
-/// falls below kDisbelieved, and below -kMost it is given up.
-constexpr double kStep = 8.0;
-constexpr double kHeadStart = 18.0;
+/// Nats. One message counts at most kConvincing; a floor just found leads by
+/// what spoke for it, at most kCertain; above kBelieved it is followed until it
+/// falls below -kBeyondDoubt, and below -kMost it is given up.
 constexpr double kBelieved = 25.0;
-constexpr double kDisbelieved = -45.0;
-constexpr double kMost = 60.0;
-/// Memory of q, and how near to certainty it may come.
-constexpr double kPartMemory = 20.0;
-constexpr double kLeastPart = 0.02;
-/// A floor that has been out of sight for so long that its offset is known to
-/// no more than this part of the mean wait would take waits for the floor.
-constexpr double kUseful = 1.0 / 16.0;
-/// Sigma of the fit within which the two pictures agree.
-constexpr double kAgree = 3.0;
-/// Four messages that the first picture explains and the second does not, while
-/// it is sharp, or two while it is much sharper; each that both explain takes
-/// half a one away, unless they are far apart.
-constexpr std::uint8_t kExplainedAlone = 8;
-constexpr double kSharp = 4.0;
-constexpr double kSharper = 32.0;
-constexpr double kFarApart = 1.0 / 32.0;
-constexpr double kShort = 1.0 / 64.0;
-constexpr double kLeastLogDensity = -600.0;
-/// Messages.
-constexpr std::uint8_t kLateMemory = 8;
+constexpr double kMost = kBeyondDoubt + kCertain;
+/// Times by which one is so much sharper that the other is none.
+constexpr double kMuchSharper = 32.0;
+/// Halves of messages that the first picture explains and the second does not:
+/// four while it is sharp, two while it is much sharper; each that both explain
+/// takes one half away, unless they are far apart.
+constexpr std::uint8_t kExplainedAlone = 2 * kFew;
 
 }  // namespace
 
@@ -52,9 +37,11 @@ double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
   return std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
 }
 
+/// A floor that has been out of sight for so long that its offset is not that
+/// sharp any more would take waits for the floor.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
-  return floor_.offset_sigma_ns(0.0) < kUseful * std::max(floor_.mean_wait(), plain_noise_ns());
+  return floor_.offset_sigma_ns(0.0) < kSharp * std::max(floor_.mean_wait(), plain_noise_ns());
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -62,10 +49,10 @@ bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
 /// nothing, and what comes late from now on will not either.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
-  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const double apart = floor_.estimate().x - plain_.estimate().x;
   const double floor = floor_.offset_sigma_ns(0.0);
   const double plain = plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
-  return plain < 2.0 * floor && apart < kAgree * floor;
+  return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
 /// The first picture is far from the floor, and knows its offset much better
@@ -75,7 +62,7 @@ template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  return noise < kFarApart * apart && kSharp * noise < floor_.offset_sigma_ns(0.0);
+  return kMuchSharper * noise < apart && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
 
 /// Where messages wait the first picture is never as sharp as the waits are
@@ -85,10 +72,10 @@ template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  const bool contradicts = noise < kFarApart * apart;
+  const bool contradicts = kMuchSharper * noise < apart;
   const bool sharp =
-      contradicts || noise < kSharp * floor_.scale() || noise < kShort * floor_.mean_wait();
-  const bool sharper = kSharper * noise < floor_.scale();
+      contradicts || noise < kMuch * floor_.scale() || kMuchSharper * noise < floor_.mean_wait();
+  const bool sharper = kMuchSharper * noise < floor_.scale();
   if (!sharp || (own > 0.5 && credit < 0.5)) {
     explained_alone_ = 0;
   } else if (credit > 0.5 && (own < 0.5 || sharper)) {
@@ -113,7 +100,7 @@ bool LoadAwareEstimator<Grid>::begins_to_wait(double credit) noexcept {
   const bool is_late = off && plain_.innovation_ns() > 0.0;
   const bool begins = is_late && late_ > 0 && plain_.settled();
   if (off) {
-    late_ = is_late ? kLateMemory : 0;
+    late_ = is_late ? kLately : 0;
   } else if (late_ > 0) {
     --late_;
   }
@@ -142,7 +129,7 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
   if (floor_.locked() || !lucky_.found(direction)) return false;
   start_floor(lucky_.ns(direction));
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
-  lead_ = recent_lead_ = kHeadStart;
+  lead_ = recent_lead_ = kCertain;
   return true;
 }
 
@@ -171,7 +158,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     explained_alone_ = 0;
     agreed = agree();
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
-    if (!believed_) lead_ = recent_lead_ = std::min(floor_.evidence(), kHeadStart);
+    if (!believed_) lead_ = recent_lead_ = std::min(floor_.evidence(), kCertain);
   } else if (followed && floor_.locked()) {
     compare(credit, own);
   }
@@ -179,7 +166,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
-  believed_ = floor_.locked() && lead >= kDisbelieved && convinces && !overruled() &&
+  believed_ = floor_.locked() && lead >= -kBeyondDoubt && convinces && !overruled() &&
               !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
@@ -188,20 +175,20 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
 template <class Grid>
 void LoadAwareEstimator<Grid>::follow_lead(Direction direction) noexcept {
   const FloorEstimator::Testimony& said = floor_.testimony();
-  const double plain = quick_exp(std::max(plain_.log_density(), kLeastLogDensity));
+  const double plain = quick_exp(std::max(plain_.log_density(), kLeastExponent));
   double& part = learnt_part_[direction];
   const double learnt = part * said.waiting;
   const double waits = learnt + (1.0 - part) * plain;
   const auto follow = [&](double& lead, double share) {
     const double density = share * said.at_floor + (1.0 - share) * waits;
-    const double gained = std::clamp(quick_log(density / plain), -kStep, kStep);
+    const double gained = std::clamp(quick_log(density / plain), -kConvincing, kConvincing);
     lead = std::clamp(lead + gained, -kMost, kMost);
     return (1.0 - share) * waits / density;  // probability that it waited
   };
   const double waited = follow(lead_, said.share);
   (void)follow(recent_lead_, said.recent_share);
-  part += (waited * learnt / waits - part * waited) / kPartMemory;
-  part = std::clamp(part, kLeastPart, 1.0 - kLeastPart);
+  part += (waited * learnt / waits - part * waited) / kLately;
+  part = std::clamp(part, kNowAndThen, 1.0 - kNowAndThen);
 }
 
 template class LoadAwareEstimator<FullGrid>;

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/time/per_direction.h"
 
 namespace ftcs::estimation {
@@ -21,16 +21,16 @@ class LuckyLevel {
   /// `noise` ns > 0 is usual; `fits`: it is as believed.
   void observe(Direction direction, bool fits, double early, double noise) noexcept {
     Side& side = sides_[direction];
-    if (side.without < kMost) ++side.without;
-    if (side.seen > 0 && ++side.since > kRarest * side.seen) side.seen = 0;
-    if (side.since >= kMost) {
+    if (side.without < kLongestMemory) ++side.without;
+    if (side.seen > 0 && ++side.since > kOutlierMemory * side.seen) side.seen = 0;
+    if (side.since >= kLongestMemory) {
       side.since /= 2;
       side.seen /= 2;
     }
     if (fits || !(early > 0.0)) return;
     side.without = 0;
     const double off = early - static_cast<double>(side.level);
-    if (side.seen == 0 || std::abs(off) > kSame * noise) {
+    if (side.seen == 0 || off * off > kFarOff * noise * noise) {
       side.seen = 1;
       side.since = 0;
       side.level = static_cast<float>(early);
@@ -39,20 +39,21 @@ class LuckyLevel {
       side.level += static_cast<float>(off) / static_cast<float>(side.seen);
     }
   }
-  /// This direction has a level, reached by few of its messages (else the path
+  /// This direction has a level (with one outlier in 300, all of one size, six
+  /// are none in any of 400 runs), reached by few of its messages (else the path
   /// has changed), and the other has none: so many have come without one that
   /// it is no chance.
   [[nodiscard]] bool found(Direction direction) const noexcept {
     const Side& own = sides_[direction];
     const double missing = share(direction) * sides_[opposite(direction)].without;
-    return own.seen >= kEnough && 2 * own.seen < own.since && missing > kNoChance;
+    return own.seen >= kRepeated && 2 * own.seen < own.since && missing > kConvincing;
   }
   /// Both directions have lucky messages, by the same early: the others all
   /// wait alike, and no floor of one direction is to be followed.
   [[nodiscard]] bool alike(double noise) const noexcept {
     const double apart = static_cast<double>(sides_.forward.level - sides_.backward.level);
     return std::min(sides_.forward.seen, sides_.backward.seen) >= kBoth &&
-           std::abs(apart) < kSame * noise;
+           apart * apart < kFarOff * noise * noise;
   }
   /// ns below what was believed.
   [[nodiscard]] double ns(Direction direction) const noexcept {
@@ -71,17 +72,8 @@ class LuckyLevel {
     std::uint16_t since = 0;    ///< messages since the first of them
     std::uint16_t without = 0;  ///< messages since the last early one
   };
-  /// With one outlier in 300, all of one size, six are no level in any of 400 runs.
-  static constexpr std::uint16_t kEnough = 6;
-  /// One in so many: what is rarer is no floor to follow.
-  static constexpr std::uint16_t kRarest = 48;
-  /// Messages that should have been lucky: e^-10.
-  static constexpr double kNoChance = 10.0;
   /// At the levels of both directions: two coincidences.
   static constexpr std::uint16_t kBoth = 2;
-  /// Sigma.
-  static constexpr double kSame = 4.0;
-  static constexpr std::uint16_t kMost = 4096;
 
   PerDirection<Side> sides_{};
 };

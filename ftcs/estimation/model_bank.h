@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/clock_state.h"
 #include "ftcs/estimation/delay_shape.h"
 #include "ftcs/estimation/lanes.h"
@@ -123,7 +124,7 @@ class ModelBank {
       furthest = larger(furthest, distance);
     }
     if (tail > 0.0) judge_late(s2 * shape.variance, s2, tail, out);
-    if (gate && largest(furthest) > kSuspicious) doubt(outliers, out);
+    if (gate && largest(furthest) > kThreeSigma) doubt(outliers, out);
     return out;
   }
 
@@ -273,9 +274,6 @@ class ModelBank {
   /// Even the calmest path changes in the end; keeps the covariance of d from
   /// collapsing.
   static constexpr double kDelayWalk = 1e-9;
-  /// Two sigma: below it the outlier hypothesis cannot win, so its density is
-  /// not worth computing.
-  static constexpr double kSuspicious = 4.0;
 
   /// Queueing noise: slope, curvature and density of the late shape.
   static void judge_late(double noise, double s2, double tail, Innovations& out) noexcept {
@@ -288,22 +286,21 @@ class ModelBank {
     }
   }
 
-  /// The outlier hypothesis: density probability / (10 |centred|), broad and
-  /// scale-free.
+  /// The outlier hypothesis: an error of any size. Up to three sigma nothing is
+  /// taken for one, and its density is not worth computing.
   static void doubt(const OutlierPrior& outliers, Innovations& out) noexcept {
     for (std::size_t i = 0; i < kSize; i += kStep) {
       const V distance = load<V>(&out.distance[i]);
-      if (largest(distance) <= kSuspicious) continue;
+      if (largest(distance) <= kThreeSigma) continue;
       const V centred = load<V>(&out.centred[i]);
       const V late = V{} + outliers.late;
       const V early = V{} + outliers.early;
       const V probability = centred > 0.0 ? late : early;
-      const V size = larger<V>(magnitude(centred), 3.0 * root(load<V>(&out.variance[i])));
-      const V outlier = probability / (10.0 * size);
+      const V outlier = probability / any_size<V>(centred, root(load<V>(&out.variance[i])));
       const V log_density = load<V>(&out.log_density[i]);
       const V density = quick_exp(larger<V>(log_density, V{} + kLeastExponent));
       const V mixed = density + outlier;
-      const V near = V{} + kSuspicious;
+      const V near = V{} + kThreeSigma;
       const V one = V{} + 1.0;
       const V credit = distance > near ? density / mixed : one;
       store(&out.credit[i], credit);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/quick_math.h"
 #include "ftcs/measurement/order_statistic.h"
@@ -11,27 +12,18 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Longest memory: shorter would cost accuracy, longer would not follow a
-/// change of load.
-constexpr double kMemory = 1000.0;
-/// A sample further from the median than this is an outlier for the purpose of
-/// learning, whatever the gate thinks: the gate's own judgement must not decide
-/// what noise looks like.
+/// A sample further from the median than this many sigma is an outlier for the
+/// purpose of learning, whatever the gate thinks: the gate's own judgement must
+/// not decide what noise looks like.
 constexpr double kAcceptSigmas = 12.0;
 /// Variance above this times the robust one: the moments belong to the past. A
 /// third of the deviation (9) happens by chance to a window of 32 once in half
 /// a million messages.
 constexpr double kStaleRatio = 16.0;
-constexpr double kSquareLimit = 60.0;
 /// Moments worth standardising by.
 constexpr double kShapeSamples = 16.0;
-/// Memory of the shape ratio in samples, and its bounds: one sample convinces
-/// nobody, and old certainty must not outlive a change.
-constexpr double kShapeMemory = 300.0;
-constexpr double kShapeFloor = -15.0;
-constexpr double kShapeStep = -6.0;
-/// Share of outliers that the alternative to queueing assumes.
-constexpr double kOutliers = 0.1;
+/// Nats: one sample convinces nobody.
+constexpr double kShapeStep = 6.0;
 /// The alternative is a crude picture of outliers: where it explains half of
 /// what a queue explains no queue is needed. Measured: queues lead by 0.2 nats
 /// a message, bursts never.
@@ -44,15 +36,15 @@ constexpr double kTailOn = 8.0;
 constexpr double kSureness = 16.0;
 constexpr double kTailOff = -12.0;
 
-double normal_log_density(double w) noexcept { return -0.5 * w * w - 0.9189385332046727; }
+double normal_log_density(double w) noexcept { return -0.5 * w * w - 0.5 * kLn2Pi; }
 
 /// Normal but for some late outliers of any size: what bursts and detours make
 /// of a path. Their moments look like queueing, but the floor of the delay is
 /// not where queueing would put it.
 double spoilt_log_density(double w) noexcept {
-  const double outliers = w > 0.0 ? kOutliers / (10.0 * std::max(w, 3.0)) : 0.0;
-  const double normal = quick_exp(std::max(normal_log_density(w), -700.0));
-  return quick_log((1.0 - kOutliers) * normal + outliers);
+  const double outliers = w > 0.0 ? kUnlikely / any_size(w, 1.0) : 0.0;
+  const double normal = quick_exp(std::max(normal_log_density(w), kLeastExponent));
+  return quick_log((1.0 - kUnlikely) * normal + outliers);
 }
 
 }  // namespace
@@ -60,11 +52,11 @@ double spoilt_log_density(double w) noexcept {
 template <std::size_t Window>
 bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& shape) noexcept {
   recent_.push(sample.innovation);
-  if (recent_.size() < 8) return false;
+  if (recent_.size() < kLately) return false;
   const double median = recent_.median();
   const double robust = kMadToSigma * recent_.median_deviation();
   if (recent_.full() && variance_ > kStaleRatio * robust * robust) {
-    count_ = 8.0;
+    count_ = kLately;
     variance_ = robust * robust;
     ratio_ = {};
     spoilt_ = 0.0F;
@@ -76,11 +68,11 @@ bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& sh
   if (!acceptable) return false;
 
   count_ += 1.0;
-  const double share = 1.0 / std::min(count_, kMemory);
+  const double share = 1.0 / std::min(count_, kLongMemory);
   const double difference = sample.innovation - mean_;
   mean_ += share * difference;
   const double own = noise / (sample.predicted + noise);
-  const double limit = kSquareLimit * sample.robust_scale * sample.robust_scale * noise;
+  const double limit = kEightSigma * sample.robust_scale * sample.robust_scale * noise;
   variance_ +=
       share * (std::min(difference * (sample.innovation - mean_) * own, limit) - variance_);
   const auto part = static_cast<float>(1.0 / std::min(count_, kBodyMemory));
@@ -90,10 +82,11 @@ bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& sh
     const double deviation = std::sqrt(variance_);
     const double w = (sample.innovation - mean_) / deviation;
     const double normal = normal_log_density(w);
+    // Old certainty must not outlive a change.
     const auto follow = [normal](float& ratio, double log_density) {
-      const double gain = std::clamp(log_density - normal, kShapeStep, -kShapeStep);
-      const double kept = static_cast<double>(ratio) * (1.0 - 1.0 / kShapeMemory);
-      ratio = static_cast<float>(std::max(kShapeFloor, kept + gain));
+      const double gain = std::clamp(log_density - normal, -kShapeStep, kShapeStep);
+      const double kept = static_cast<double>(ratio) * (1.0 - 1.0 / kLoadMemory);
+      ratio = static_cast<float>(std::max(-kSure, kept + gain));
     };
     for (std::size_t i = 0; i < kTailShares.size(); ++i) {
       follow(ratio_[i], standard_late_log_density(w, kTailShares[i]));

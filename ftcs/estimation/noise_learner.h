@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/delay_shape.h"
 #include "ftcs/estimation/sorted_window.h"
 
@@ -27,9 +28,6 @@ struct NoiseSample {
 template <std::size_t Window>
 class NoiseLearner {
  public:
-  /// Samples before the variance is worth more than the common median scale.
-  static constexpr double kMature = 24.0;
-
   /// Returns whether the sample was taken.
   bool learn(const NoiseSample& sample, const DelayShape& shape) noexcept;
   void restart() noexcept { *this = NoiseLearner{}; }
@@ -40,8 +38,8 @@ class NoiseLearner {
     body_mean_ += static_cast<float>(shift);
   }
 
-  /// variance() may be used, ns^2.
-  [[nodiscard]] bool mature() const noexcept { return count_ >= kMature; }
+  /// variance(), ns^2, is worth more than the common median scale.
+  [[nodiscard]] bool mature() const noexcept { return count_ >= kShortMemory; }
   [[nodiscard]] double count() const noexcept { return count_; }
   [[nodiscard]] double variance() const noexcept { return variance_; }
   [[nodiscard]] bool has_tail() const noexcept { return has_tail_; }

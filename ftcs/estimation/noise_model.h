@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
 
 /// One hypothesis of how clock and path wander. Dimensionless: variances in
@@ -36,19 +38,19 @@ template <std::size_t size>
 /// 1065, power laws of FM noise).
 struct FullGrid {
   static constexpr std::size_t kResidualWindow = 32;  ///< innovations behind the robust scale
-  static constexpr std::size_t kNoiseWindow = 32;     ///< of the noise learner, per direction
-  static constexpr std::size_t kOpinionWindow = 16;   ///< messages of the second opinion
+  static constexpr std::size_t kNoiseWindow =
+      kResidualWindow;                               ///< of the noise learner, per direction
+  static constexpr std::size_t kOpinionWindow = 16;  ///< messages of the second opinion
   static constexpr bool kWatchesJumps = true;
   static constexpr bool kFollowsFloor = true;  ///< where messages queue
-  static constexpr std::size_t kSize = 28;
-  static constexpr std::size_t kStart = 13;  ///< the model that is believed before any evidence
+  static constexpr std::size_t kStart = 13;    ///< the model that is believed before any evidence
   static constexpr double kCalmFavour = 0.0;
   static constexpr std::size_t kFavoured = 7;  ///< believed a little more than its neighbours
   static constexpr std::size_t kSudden = 25;   ///< from here on models explain any single message
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return static_cast<double>(i) - static_cast<double>(kStart);
   }
-  static constexpr std::array<NoiseModel, kSize> kModels = {{
+  static constexpr auto kModels = std::to_array<NoiseModel>({
       {0.0, 0.0, 0.0},   {0.0, 1e-14, 0.0},  {0.0, 1e-13, 0.0}, {0.0, 1e-12, 0.0},
       {0.0, 1e-11, 0.0}, {0.0, 1e-10, 0.0},  {1e-5, 0.0, 0.0},  {0.0, 1e-9, 0.0},
       {0.0, 1e-8, 0.0},  {1e-4, 1e-10, 0.0}, {0.0, 1e-7, 0.0},  {0.0, 1e-6, 0.0},
@@ -56,23 +58,29 @@ struct FullGrid {
       {1e-2, 1e-6, 0.0}, {0.0, 1e-3, 0.0},   {0.0, 1e-2, 0.0},  {1e-1, 1e-7, 0.0},
       {1e-1, 1e-4, 0.0}, {0.0, 1e-1, 0.0},   {0.0, 1e0, 0.0},   {1e0, 1e-6, 0.0},
       {1e0, 1e-3, 0.0},  {0.0, 1e1, 0.0},    {0.0, 1e2, 0.0},   {0.0, 1e3, 0.0},
-  }};
+  });
+  static constexpr std::size_t kSize = kModels.size();
 };
 
 /// Beside the full bank, for the messages that wait for nothing on a path where
 /// others queue. They are few, and tell less finely how the oscillator wanders:
 /// half of the full bank's models.
 struct FloorGrid {
-  static constexpr std::size_t kSize = 14;
-  static constexpr std::size_t kStart = 6;
-  static constexpr std::size_t kFavoured = 1;
+  /// Their places in the full bank.
+  static constexpr auto kInFull =
+      std::to_array<std::size_t>({0, 7, 8, 9, 10, 11, 13, 14, 15, 17, 18, 21, 24, 25});
+  static constexpr std::size_t kSize = kInFull.size();
+  static constexpr auto kPlaceOf = [](std::size_t in_full) constexpr noexcept {
+    std::size_t i = 0;
+    while (kInFull[i] < in_full) ++i;
+    return i;
+  };
+  static constexpr std::size_t kStart = kPlaceOf(FullGrid::kStart);
+  static constexpr std::size_t kFavoured = kPlaceOf(FullGrid::kFavoured);
+  static constexpr std::size_t kSudden = kPlaceOf(FullGrid::kSudden);
   /// Twice nats for the one that stands for seven nearly constant ones of the
   /// full bank: 2 ln 7.
   static constexpr double kCalmFavour = 3.9;
-  static constexpr std::size_t kSudden = 13;
-  /// Their places in the full bank.
-  static constexpr std::array<std::size_t, kSize> kInFull = {0,  7,  8,  9,  10, 11, 13,
-                                                             14, 15, 17, 18, 21, 24, 25};
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return FullGrid::places_from_start(kInFull[i]);
   }
@@ -88,24 +96,21 @@ struct FloorGrid {
 /// detection of changes, but neither learnt noise shapes nor a second opinion.
 /// What that costs: docs/adaptive-servo.md.
 struct SmallGrid {
-  static constexpr std::size_t kResidualWindow = 8;
+  static constexpr std::size_t kResidualWindow = kLately;
   static constexpr std::size_t kNoiseWindow = 0;
   static constexpr std::size_t kOpinionWindow = 0;
   static constexpr bool kWatchesJumps = false;
   static constexpr bool kFollowsFloor = false;
-  static constexpr std::size_t kSize = 3;
   static constexpr std::size_t kStart = 1;
   static constexpr double kCalmFavour = 0.0;
-  static constexpr std::size_t kFavoured = kSize;  // none
-  static constexpr std::size_t kSudden = kSize;
   [[nodiscard]] static constexpr double places_from_start(std::size_t i) noexcept {
     return static_cast<double>(i) - static_cast<double>(kStart);
   }
-  static constexpr std::array<NoiseModel, kSize> kModels = {{
-      {0.0, 1e-9, 0.0},
-      {0.0, 1e-4, 0.0},
-      {0.0, 1e1, 0.0},
-  }};
+  static constexpr auto kModels =
+      std::to_array<NoiseModel>({{0.0, 1e-9, 0.0}, {0.0, 1e-4, 0.0}, {0.0, 1e1, 0.0}});
+  static constexpr std::size_t kSize = kModels.size();
+  static constexpr std::size_t kFavoured = kSize;  // none
+  static constexpr std::size_t kSudden = kSize;
 };
 
 }  // namespace ftcs::estimation

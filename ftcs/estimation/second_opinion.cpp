@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/line_sums.h"
 #include "ftcs/measurement/order_statistic.h"
 
@@ -14,25 +15,9 @@ namespace {
 
 /// Concentration steps per start: convergence is that fast on a line.
 constexpr int kSteps = 3;
-/// No fit leaves much less than the roughness, which is the larger part of the
-/// noise; where innovations are below this part of the contradiction times the
-/// roughness, save the work.
-constexpr double kWorth = 0.8;
-/// Cycles. No line is worth fitting across it, and the times before would cost
-/// digits.
-constexpr double kLongestGap = 1e5;
-/// Innovations of one direction that differ by less than this part are no
-/// noise.
-constexpr double kSameInnovation = 0.25;
 constexpr double kFullFreedom = 9.0;
-/// Of one direction: so many in a row cannot all be outliers.
-constexpr std::size_t kManyMessages = 6;
 /// Luck in one direction alone is more frequent.
 constexpr double kOneSided = 3.0;
-/// Below this number of spare messages a fit proves nothing.
-constexpr std::size_t kLeastFreedom = 3;
-/// A fit may be exact (simulated or coarse stamps); the noise is not.
-constexpr double kSmallestScale = 1e-4;
 
 /// Brings the `wanted` smallest of `count` values to the front, in order. For
 /// the few values here selection is as quick as anything, and needs nothing of
@@ -67,7 +52,7 @@ void SecondOpinion<Capacity>::push(const Observation& seen, double innovation) n
   next_ = next_ + 1 == Capacity ? 0 : next_ + 1;
   size_ = std::min(size_ + 1, Capacity);
   const std::size_t side = seen.sign > 0.0 ? 0 : 1;
-  const bool same = std::abs(innovation - latest_[side]) < kSameInnovation * std::abs(innovation);
+  const bool same = std::abs(innovation - latest_[side]) < kSmallPart * std::abs(innovation);
   alike_[side] = same ? static_cast<std::uint8_t>(std::min(alike_[side] + 1, 100)) : 0;
   latest_[side] = innovation;
 }
@@ -190,7 +175,7 @@ typename SecondOpinion<Capacity>::Sizes SecondOpinion<Capacity>::innovations(
     sizes[count++] = size;
     least = std::min(least, size);
   }
-  return {ranked(sizes, count, count / 2), count < kManyMessages ? 0.0 : least};
+  return {ranked(sizes, count, count / 2), count < kRepeated ? 0.0 : least};
 }
 
 /// Root mean square of what `line` leaves of the kept messages of one
@@ -207,7 +192,7 @@ double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
     squares += r * r;
     members += 1.0;
   }
-  return std::max(kSmallestScale, std::sqrt(squares / std::max(members, 1.0)));
+  return std::max(kLeastNoise, std::sqrt(squares / std::max(members, 1.0)));
 }
 
 /// Distance of a message from the chord of its neighbours of the same
@@ -250,7 +235,9 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const bool delay_free = question.delay_free;
   const double known_delay = question.known_delay;
   FreshFit result;
-  const double worth = kWorth * question.contradiction;
+  // No fit leaves much less than the roughness, which is the larger part of the noise: where
+  // innovations are not far above that, save the work.
+  const double worth = question.contradiction;
   if (!contradicted(worth * roughness(1.0), worth * roughness(-1.0))) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
@@ -264,7 +251,7 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
       continue;
     }
     Kept kept = closest(through(a, b, delay_free, known_delay));
-    if (kept.count < unknowns + kLeastFreedom) return result;
+    if (kept.count < unknowns + kFew) return result;
     Estimate line;
     for (int step = 0; step < kSteps; ++step) {
       line = fit(kept, delay_free, known_delay);
@@ -278,7 +265,7 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   }
   if (best < 0.0) return result;
   const double freedom = static_cast<double>(best_kept.count - unknowns);
-  result.scale_ns = std::max(kSmallestScale, std::sqrt(best / freedom));
+  result.scale_ns = std::max(kLeastNoise, std::sqrt(best / freedom));
   const double needed = question.contradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
   result.better = contradicted(needed * left_by(result.estimate, best_kept, 1.0),
                                needed * left_by(result.estimate, best_kept, -1.0));

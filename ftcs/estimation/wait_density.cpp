@@ -4,21 +4,16 @@
 #include <algorithm>
 #include <numbers>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
 
 /// What the exponential of the start counts, in messages.
-constexpr double kStart = 20.0;
-/// Memory in messages: beyond it everything counts half.
-constexpr float kMemory = 1000.0F;
-/// A cell with so many has a density of its own.
-constexpr double kEnough = 4.0;
-/// Messages that are taken to wait longer than any that were seen.
-constexpr double kUnseen = 0.5;
-/// The table is made anew after so many messages.
-constexpr float kTell = 4.0F;
+constexpr double kStart = kShortMemory;
+/// Beyond it everything counts half.
+constexpr auto kMemory = static_cast<float>(kLongMemory);
 
 }  // namespace
 
@@ -27,7 +22,7 @@ void WaitDensity::start(double mean_wait_ns) noexcept {
   double edge = 1.0;
   for (float& count : count_) {
     edge *= std::numbers::sqrt2;
-    const double beyond = quick_exp(std::max(-edge / mean_wait_ns, -700.0));
+    const double beyond = quick_exp(std::max(-edge / mean_wait_ns, kLeastExponent));
     count = static_cast<float>(kStart * (above - beyond));
     above = beyond;
   }
@@ -44,7 +39,7 @@ void WaitDensity::learn(double nu, double waited) noexcept {
     for (float& count : count_) count *= 0.5F;
     mass_ *= 0.5F;
   }
-  if (untold_ >= kTell) tabulate();
+  if (untold_ >= static_cast<float>(kFew)) tabulate();
 }
 
 /// Neighbouring cells share a density until enough lies in them.
@@ -58,14 +53,14 @@ void WaitDensity::tabulate() noexcept {
   for (std::size_t cell = 0; cell < kCells; ++cell) {
     upper *= std::numbers::sqrt2;
     seen += static_cast<double>(count_[cell]);
-    if (seen < kEnough) continue;
+    if (seen < kFew) continue;
     const auto even = static_cast<float>(seen / (mass * (upper - begin)));
     for (; open <= cell; ++open) density_[open] = even;
     begin = upper;
     seen = 0.0;
   }
-  // What is left lies in the last cells, as much in each.
-  const double each = std::max(seen, kUnseen) / static_cast<double>(kCells - open);
+  // What is left, one message at least, lies in the last cells, as much in each.
+  const double each = std::max(seen, 1.0) / static_cast<double>(kCells - open);
   for (double width = begin * (std::numbers::sqrt2 - 1.0); open < kCells;
        ++open, width *= std::numbers::sqrt2) {
     density_[open] = static_cast<float>(each / (mass * width));
