@@ -235,8 +235,10 @@ class Fit {
     const bool ahead = fit.clear(Direction::kForward);
     const bool back = fit.clear(Direction::kBackward);
     if (ahead == back) {
-      fit.evidence =
-          ahead ? speaks.forward + speaks.backward : std::min(speaks.forward, speaks.backward);
+      // Together they must convince for two, and each speak for half of that.
+      const double sum = speaks.forward + speaks.backward;
+      const double less = std::min(speaks.forward, speaks.backward);
+      fit.evidence = ahead ? sum : std::min(0.5 * sum, 2.0 * less);
     } else {
       fit.evidence = ahead ? speaks.backward : speaks.forward;
     }

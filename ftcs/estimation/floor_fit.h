@@ -30,9 +30,9 @@ struct FloorFit {
   Estimate estimate{};    ///< at `now` of the windows; covariances in units of sigma^2
   PerDirection<FloorNoise> noise{};
   PerDirection<double> members{};  ///< messages at the floor
-  /// Nats by which the floor explains the messages better than waits without
-  /// one, of the direction that has less; what the choice of three unknowns is
-  /// worth is taken off.
+  /// Nats by which the floor explains the messages of one direction better than waits without one
+  /// do; what the choice of three unknowns is worth is taken off. Where both have waits it is the
+  /// mean of both, and at most twice that of the direction that has less.
   double evidence = 0.0;
   double log_likelihood = 0.0;  ///< of all messages
   double said = 0.0;            ///< the same by the filters that heard them
