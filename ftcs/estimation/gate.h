@@ -49,10 +49,9 @@ class Gate {
     if (divergence_.diverged()) return Verdict::kDiverged;
     ++rejected;
     const bool alone = rejected_[1 - side] == 0;  // a host that stands still makes both late
-    // So many cannot all be outliers, fewer where outliers were rare before them, or a change has
-    // just been followed; nor can more than were ever taken.
-    const bool good_path = late_outliers_[side] < kRare || since_change < kShortMemory;
-    const std::uint8_t enough = alone && good_path ? kRepeated : kLately;
+    // So many cannot all be outliers, fewer where a change has just been followed; nor can more
+    // than were ever taken.
+    const std::uint8_t enough = alone && since_change < kShortMemory ? kRepeated : kLately;
     if (rejected < std::max(kFew, std::min(enough, taken))) return Verdict::kShut;
     const bool certain = alone && rejected >= enough;
     rejected = 0;
@@ -63,9 +62,6 @@ class Gate {
   void explained() noexcept { divergence_ = {}; }
 
  private:
-  /// Learnt from nearly nothing but kRepeated in a row.
-  static constexpr double kRare = static_cast<double>(kRepeated) / kOutlierMemory;
-
   std::array<double, 2> late_outliers_ = {kNowAndThen, kNowAndThen};
   std::array<std::uint8_t, 2> rejected_{};  ///< in a row
   std::array<std::uint8_t, 2> taken_{};     ///< up to as many as would open the gate
