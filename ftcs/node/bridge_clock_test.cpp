@@ -101,7 +101,7 @@ TEST_P(BridgeClockTest, believes_no_stamps_that_stand_still_or_are_of_another_ti
   EXPECT_TRUE(clock_.plant(kTracking));
 }
 
-TEST_P(BridgeClockTest, costs_a_cycle_as_much_as_60_divisions_at_most_and_no_heap) {
+TEST_P(BridgeClockTest, costs_a_cycle_as_much_as_38_divisions_at_most_and_no_heap) {
   constexpr int kCycles = 1'000;
   std::int64_t n = 0;
   Duration sum;
@@ -115,7 +115,9 @@ TEST_P(BridgeClockTest, costs_a_cycle_as_much_as_60_divisions_at_most_and_no_hea
   RecordProperty("ns_a_cycle", static_cast<int>(cost.ns));
   RecordProperty("divisions_a_cycle", static_cast<int>(cost.divisions));
   EXPECT_GT(sum.seconds(), 0.0);
-  EXPECT_LT(cost.divisions, 60.0);
+  if (!test::kInstrumented) {
+    EXPECT_LT(cost.divisions, 38.0);
+  }
 }
 
 }  // namespace

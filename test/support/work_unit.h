@@ -6,6 +6,19 @@
 
 namespace ftcs::test {
 
+/// Whether a sanitizer's own work is in the code: what that costs is not what ships.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kInstrumented = true;
+#else
+inline constexpr bool kInstrumented = false;
+#endif
+
+/// Cost of one unit of work, the least that was seen.
+struct WorkUnits {
+  double divisions{};  ///< as a multiple of one division in a chain
+  double ns{};
+};
+
 /// @brief Cost of work as a multiple of work that is known, both measured in turn.
 ///
 /// A limit in nanoseconds is one of the machine: where it clocks lower or shares its core, both are
@@ -13,12 +26,6 @@ namespace ftcs::test {
 /// each needs the result before it (13 to 20 cycles on x86-64; 4 to 5 ns at 3 to 4 GHz).
 /// @param batches  times that both are measured; the least of each counts.
 /// @param units  units of what is measured in one call of `work`.
-/// @return least cost of one unit in divisions, and in nanoseconds.
-struct WorkUnits {
-  double divisions{};
-  double ns{};
-};
-
 template <class Work>
 WorkUnits measure_work(int batches, int units, Work work) {
   using Clock = std::chrono::steady_clock;
