@@ -157,6 +157,8 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
         detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, true})
             .source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
+    // A model so wild that it takes waits for the floor knows nothing better.
+    if (scale_ * std::sqrt(bank_.estimate(source).xx) > kSharp * mean_wait_) continue;
     bank_.set(i, bank_.estimate(source));
   }
 }
@@ -184,7 +186,7 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
 
 bool FloorEstimator::proven() const noexcept {
   const double members = std::min(paths_.forward.members, paths_.backward.members);
-  return certainty_ > 0.0 && members > kProven;
+  return found_ && members > kProven;
 }
 
 bool FloorEstimator::dry() const noexcept {
@@ -242,7 +244,7 @@ void FloorEstimator::begin_path(Path& path, double share, double members) noexce
 
 void FloorEstimator::adopt(const FloorFit& fit) noexcept {
   begin(fit.sigma(), fit.noise.forward.mean_wait);
-  certainty_ = fit.evidence;
+  found_ = true;
   hear_members_again(fit);
   for (const Direction direction : kDirections) {
     // The earliest of b messages is at the floor with probability 1 - (1 -
@@ -259,7 +261,7 @@ void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<
                                 double scale, const PerDirection<double>& noise,
                                 double wait) noexcept {
   begin(scale, wait);
-  certainty_ = 0.0;
+  found_ = false;
   for (const Direction direction : kDirections) {
     begin_path(paths_[direction], kNearlyAll, kLongMemory / 10.0);
     paths_[direction].variance = noise[direction] * noise[direction];
@@ -271,7 +273,7 @@ void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<
 void FloorEstimator::lower(Direction direction, double ns, double share) noexcept {
   Path& path = paths_[direction];
   path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
-  certainty_ = kCertain;
+  found_ = true;
   const double sign = sign_of(direction);
   bank_.for_each([=](Estimate& e) {
     e.x -= sign * ns / 2.0;

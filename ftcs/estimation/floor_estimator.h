@@ -53,8 +53,6 @@ class FloorEstimator {
   [[nodiscard]] bool locked() const noexcept { return locked_; }
   /// The last message has made it start from a new floor.
   [[nodiscard]] bool adopted() const noexcept { return adopted_; }
-  /// Nats that spoke for that floor.
-  [[nodiscard]] double evidence() const noexcept { return certainty_; }
   /// Others, who have heard every message, say the same of this floor, and know
   /// it better.
   void take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
@@ -138,8 +136,8 @@ class FloorEstimator {
   double gain_ = 1.0;
   double said_ = 0.0;  ///< ln density of the last message
   double mean_wait_ = 0.0;
-  double certainty_ = 0.0;
-  int early_ = 0;  ///< messages for which an early one is remembered
+  bool found_ = false;  ///< by a fit or by lucky messages, not begun where a path was settled
+  int early_ = 0;       ///< messages for which an early one is remembered
   bool locked_ = false;
   bool adopted_ = false;
 };

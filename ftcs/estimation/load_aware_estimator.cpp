@@ -11,8 +11,8 @@ namespace ftcs::estimation {
 namespace {
 
 /// Nats. One message counts at most kConvincing; a floor just found leads by
-/// what spoke for it, at most kCertain; above kBelieved it is followed until it
-/// falls below -kBeyondDoubt, and below -kMost it is given up.
+/// kCertain, since both directions convinced the search; above kBelieved it is
+/// followed until it falls below -kBeyondDoubt, and below -kMost it is given up.
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
 /// Times by which one is so much sharper that the other is none.
@@ -158,7 +158,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     explained_alone_ = 0;
     agreed = agree();
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
-    if (!believed_) lead_ = recent_lead_ = std::min(floor_.evidence(), kCertain);
+    if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
     compare(credit, own);
   }

@@ -95,11 +95,12 @@ class LoadAwareEstimator {
   Estimator<Grid> plain_;
   FloorEstimator floor_{};
   LuckyLevel lucky_{};
-  double lead_ = 0.0;                           ///< nats, w by its long memory
-  double recent_lead_ = 0.0;                    ///< by its short one
-  PerDirection<double> learnt_part_{0.5, 0.5};  ///< q
-  std::uint8_t explained_alone_ =
-      0;                   ///< halves of messages that the first picture explains, not the second
+  double lead_ = 0.0;         ///< nats, w by its long memory
+  double recent_lead_ = 0.0;  ///< by its short one
+  /// q: a density that has learnt nothing yet says little.
+  PerDirection<double> learnt_part_{kNowAndThen, kNowAndThen};
+  /// Halves of messages that the first picture explains, not the second.
+  std::uint8_t explained_alone_ = 0;
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
   bool believed_ = false;
 };
