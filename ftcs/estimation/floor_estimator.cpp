@@ -207,11 +207,9 @@ void FloorEstimator::mix() noexcept {
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
   if (!locked_) return {};
-  return {true,
-          mixed_.x,
-          scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
-          mixed_.y,
-          {paths_.forward.share, paths_.backward.share}};
+  return {true,     found_,
+          mixed_.x, scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
+          mixed_.y, {paths_.forward.share, paths_.backward.share}};
 }
 
 void FloorEstimator::look() noexcept {

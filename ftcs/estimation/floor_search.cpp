@@ -117,9 +117,8 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
 
 bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
   if (wanted_ == 0) {
-    const bool due =
-        rival.there ? alarm_ : messages_ % kShortestPause == 0 && messages_ >= not_before_;
-    if (!due) return false;
+    const bool asked = !rival.found && messages_ % kShortestPause == 0 && messages_ >= not_before_;
+    if (!asked && !(rival.there && alarm_)) return false;
     begin();
   }
   // As much as one window of full length, or all the shorter ones.
@@ -139,6 +138,10 @@ void FloorSearch::end(const Rival& rival) noexcept {
   alarm_ = false;
   if (best_wanted_ > 0) return;
   const auto stride = static_cast<double>(record_.stride());
+  if (!rival.found) {  // asked again after twice as long, or when something is late
+    pause_ = std::min(2U * pause_, kLongestPause);
+    if (messages_ > kLongestPause) not_before_ = messages_ + pause_;
+  }
   if (rival.there) {
     const double usual = 1.0 / std::min(rival.share.forward, rival.share.backward);
     if (stride < kSmallPart * usual && record_.stride() < kMostStride) {
@@ -148,9 +151,6 @@ void FloorSearch::end(const Rival& rival) noexcept {
     }
     return;
   }
-  // Nothing found: asked again after twice as long, or when something is late.
-  pause_ = std::min(2U * pause_, kLongestPause);
-  if (messages_ > kLongestPause) not_before_ = messages_ + pause_;
   if (clear_) {
     record_.refine();
   } else if (record_.full() && record_.stride() < kMostStride) {

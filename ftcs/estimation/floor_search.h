@@ -27,6 +27,7 @@ class FloorSearch {
   /// must be.
   struct Rival {
     bool there = false;
+    bool found = false;            ///< if not, another is looked for all the time
     double offset = 0.0;           ///< ns, at the last message
     double offset_sigma = 0.0;     ///< ns
     double rate = 0.0;             ///< ns per cycle
