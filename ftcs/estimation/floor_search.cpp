@@ -117,8 +117,9 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
 
 bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
   if (wanted_ == 0) {
+    const bool in_doubt = rival.there && alarm_;
     const bool asked = !rival.found && messages_ % kShortestPause == 0 && messages_ >= not_before_;
-    if (!asked && !(rival.there && alarm_)) return false;
+    if (!in_doubt && !asked) return false;
     begin();
   }
   // As much as one window of full length, or all the shorter ones.

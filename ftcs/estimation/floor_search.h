@@ -27,7 +27,9 @@ class FloorSearch {
   /// must be.
   struct Rival {
     bool there = false;
-    bool found = false;            ///< if not, another is looked for all the time
+    /// By a search, or by lucky messages: another is looked for after an alarm
+    /// alone. A floor that was only begun is looked for on.
+    bool found = false;
     double offset = 0.0;           ///< ns, at the last message
     double offset_sigma = 0.0;     ///< ns
     double rate = 0.0;             ///< ns per cycle

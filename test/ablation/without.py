@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""without.py BUILD [NAME]: takes one mechanism of the estimator out after the other (mechanisms.toml: a piece of its source and what stands
+"""without.py BUILD [NAME...] | without.py --texts: takes one mechanism of the estimator out after the other (mechanisms.toml: a piece of its source and what stands
 in its place), compiles what that changes beside the build, and runs the test or the scenario that is said to need it. That must fail.
-What ships has no switches for it."""
+What ships has no switches for it. --texts: only whether each piece stands in its source, once."""
 import concurrent.futures
 import os
 import re
@@ -74,15 +74,27 @@ class Build:
         return made
 
 
+def read_mechanisms():
+    with open(os.path.join(HERE, "mechanisms.toml"), "rb") as file:
+        return tomllib.load(file)["mechanism"]
+
+
+def text_of(mechanism):
+    with open(os.path.join(ROOT, mechanism["file"]), encoding="utf-8") as file:
+        return file.read()
+
+
+def stale(mechanisms):
+    """What stands in its source not once."""
+    counted = ((each, text_of(each).count(each["with"])) for each in mechanisms)
+    return [f"{each['name']}: '{each['with']}' stands {count} times in {each['file']}" for each, count in counted if count != 1]
+
+
 def taken_out(mechanism, overlay):
     path = os.path.join(overlay, mechanism["file"])
     os.makedirs(os.path.dirname(path))
-    with open(os.path.join(ROOT, mechanism["file"]), encoding="utf-8") as file:
-        text = file.read()
-    if text.count(mechanism["with"]) != 1:
-        sys.exit(f"mechanisms.toml: {mechanism['name']}: '{mechanism['with']}' stands {text.count(mechanism['with'])} times in {mechanism['file']}")
     with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace(mechanism["with"], mechanism["without"]))
+        file.write(text_of(mechanism).replace(mechanism["with"], mechanism["without"]))
 
 
 def target_of(needed_by):
@@ -120,9 +132,16 @@ def examine(build, mechanism):
 
 
 def main():
-    build = Build(sys.argv[1])
-    with open(os.path.join(HERE, "mechanisms.toml"), "rb") as file:
-        mechanisms = [each for each in tomllib.load(file)["mechanism"] if len(sys.argv) < 3 or sys.argv[2] in each["name"]]
+    mechanisms = read_mechanisms()
+    if wrong := stale(mechanisms):
+        sys.exit("mechanisms.toml: " + "\n".join(wrong))
+    if sys.argv[1:] == ["--texts"]:
+        print(f"{len(mechanisms)} mechanisms stand in their sources")
+        return 0
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
+        sys.exit(f"expected a build folder or --texts\n{__doc__}")
+    build, names = Build(sys.argv[1]), sys.argv[2:]
+    mechanisms = [each for each in mechanisms if not names or any(name in each["name"] for name in names)]
     idle = 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         tests = sorted({each["needed_by"] for each in mechanisms})
