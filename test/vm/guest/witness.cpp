@@ -25,6 +25,7 @@
 #include <sys/socket.h>
 #include <sys/timex.h>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -48,7 +49,8 @@ constexpr auto kTruth = "/sys/kernel/debug/vptp/truth";
       rms=NS     greatest RMS   sd=NS   greatest spread   drift=PPB   greatest change of the error
       worst=NS   greatest error from `from` on             peak=NS    at any time
   witness sigma FILE A-B [target=NS] [from=S] [share=PERCENT]
-      how often the error is within three times the offset_sigma_ns that --csv stated in an annotated file
+      how often the error is within three times the offset_sigma_ns that --csv stated in an annotated file,
+      plus what the stated correction of the rate brings until the truth is read
 )";
   std::exit(2);
 }
@@ -309,26 +311,51 @@ std::vector<std::string> split(const std::string& line) {
   return words;
 }
 
+using Header = std::vector<std::string>;
+
+struct Statement {
+  double offset_sigma = 0;  ///< ns
+  double correction = 0;    ///< applied rate beyond the tracked one, ppb = ns/s
+};
+
+std::optional<double> value(const Header& header, const std::vector<std::string>& words,
+                            std::string_view name) {
+  const auto found = std::ranges::find(header, name);
+  const auto column = static_cast<std::size_t>(found - header.begin());
+  if (found == header.end() || column >= words.size() || words[column].empty()) return std::nullopt;
+  return std::stod(words[column]);
+}
+
+std::optional<Statement> statement(const Header& header, const std::vector<std::string>& words) {
+  const auto sigma = value(header, words, "offset_sigma_ns");
+  if (!sigma) return std::nullopt;
+  const auto applied = value(header, words, "applied_rate_ppb");
+  const auto tracked = value(header, words, "tracking_rate_ppb");
+  return Statement{*sigma, applied && tracked ? *applied - *tracked : 0};
+}
+
 int sigma(const Arguments& arguments) {
   const Question question = parse_question(arguments, {"target", "from", "share"});
   const std::vector<Point> points = read_points(arguments[0], question);
-  std::optional<std::size_t> column;
+  Header header;
+  double before = 0;
   int count = 0, within = 0;
   for (const Point& point : points) {
     const auto words = split(point.rest);
-    if (!column) {
-      const auto found = std::ranges::find(words, "offset_sigma_ns");
-      if (found != words.end()) column = static_cast<std::size_t>(found - words.begin());
+    if (header.empty()) {
+      header = words;
       continue;
     }
-    if (point.time < question.get("from", 0) || words.size() <= *column || words[*column].empty())
-      continue;
+    const auto stated = statement(header, words);
+    const double since = point.time - std::exchange(before, point.time);
+    if (!stated || point.time < question.get("from", 0)) continue;
     ++count;
-    // A reading of the truth is whole nanoseconds.
-    if (std::abs(point.error) <= 3 * std::stod(words[*column]) + 1) ++within;
+    // A reading of the truth is whole nanoseconds. What is stated is the deviation of what was
+    // estimated; the truth is read later, after the clock has run by the rate that was to correct it.
+    const double on_its_way = std::abs(stated->correction) * since;
+    if (std::abs(point.error) <= 3 * stated->offset_sigma + 1 + on_its_way) ++within;
   }
-  if (!column || count == 0)
-    throw std::runtime_error(arguments[0] + ": no offset_sigma_ns was stated");
+  if (count == 0) throw std::runtime_error(arguments[0] + ": no offset_sigma_ns was stated");
   const double outside = 100.0 * (count - within) / count;
   std::printf(" stated=%d beyond_3_sigma=%.1f%%\n", count, outside);
   // One of fewer than a hundred tells nothing.
