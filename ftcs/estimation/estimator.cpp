@@ -48,6 +48,16 @@ void Estimator<Grid>::restart() noexcept {
   delay_freed_ = delay_freed;
 }
 
+template <class Grid>
+void Estimator<Grid>::resume(const Estimate& known, double scale_ns) noexcept {
+  restart();
+  pinned_ = false;
+  seen_ = {true, true};
+  start_again({true, known, scale_ns});
+  choose();
+  mix();
+}
+
 /// Kept in the mixed estimate, which nobody else needs before the first
 /// message.
 template <class Grid>
@@ -168,10 +178,7 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
   if (count_ > kRepeated) heed(seen, innovations);
-  if (follow_gate(side, credit, innovation)) {
-    if (count_ == 0 || diverged_) return 0.0;
-    hear_again(seen, outliers);
-  }
+  if (!follow_gate(side, credit, innovation)) return 0.0;
   learn_noise(side, innovation, innovations);
   if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
   seek_second_opinion(seen, innovation);
@@ -219,14 +226,6 @@ void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
       if (all_mature && taken % 16 == 0) adopt_shapes();
     }
   }
-}
-
-/// Not inlined: its innovations would lie on the stack of every message.
-template <class Grid>
-[[gnu::noinline]] void Estimator<Grid>::hear_again(const Observation& seen,
-                                                   const OutlierPrior& outliers) noexcept {
-  const DelayShape& shape = shape_[seen.sign > 0.0 ? 0 : 1];
-  bank_.correct(seen, scale_, bank_.judge(seen, shape, scale_, outliers, true));
 }
 
 template <class Grid>
@@ -309,27 +308,25 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
   }
 }
 
-/// True if this message is to be heard once more, or if what was believed is
-/// worth nothing.
+/// False if what was believed is worth nothing.
 template <class Grid>
 bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
   const Gate::Verdict verdict = gate_.observe(side, credit, innovation < 0.0, since_change_);
-  if (verdict == Gate::Verdict::kShut) return false;
+  if (verdict == Gate::Verdict::kShut) return true;
   diverged_ = verdict == Gate::Verdict::kDiverged;
-  if (diverged_) return true;
+  if (diverged_) return false;
   const double doubt = innovation * innovation / (scale_ * scale_);
   if (!(doubt < Bank::kLargestVariance)) {
     restart();
-    return true;
+    return false;
   }
-  const bool certain = verdict == Gate::Verdict::kOpenAlone;
   const bool delay_free = this->delay_free();
-  const bool clock = !delay_free || certain || lateness_.speaks_of_clock();
+  const bool clock = !delay_free || lateness_.speaks_of_clock();
   bank_.for_each([=](Estimate& e) {
     if (clock) e.xx += doubt;
     if (delay_free) e.dd += doubt;
   });
-  return certain;
+  return true;
 }
 
 template <class Grid>

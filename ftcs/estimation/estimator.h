@@ -73,6 +73,10 @@ class Estimator {
   /// No noise is smaller than this, ns: what rounds the timestamps makes some.
   void expect_noise_of_at_least(double noise_ns) noexcept { least_noise_ = noise_ns; }
 
+  /// Begins anew on a path of which both directions have been heard, with what
+  /// is known elsewhere at the last message; covariances in units of scale_ns^2.
+  void resume(const Estimate& known, double scale_ns) noexcept;
+
   /// The delay that was known is estimated from now on, from what it was, give
   /// or take sigma_ns: messages of the other direction will come.
   void free_delay(double sigma_ns) noexcept;
@@ -135,7 +139,6 @@ class Estimator {
   void unpin_delay(double first_sign, double variance) noexcept;
   void detect_changes(const Row& log_density, const ChangeTrust& trust) noexcept;
   [[nodiscard]] bool follow_gate(std::size_t side, double credit, double innovation) noexcept;
-  void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
   void choose() noexcept;
   [[nodiscard]] double edge_bias_ns(std::size_t side) const noexcept;
   void mix() noexcept;

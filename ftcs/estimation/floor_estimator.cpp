@@ -129,21 +129,29 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                  distance, log_density});
 }
 
+/// Late messages that agree by chance or by the length of a frame are no jump:
+/// it makes those of one direction early, and not by much less, or none is at
+/// the floor any more.
+bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
+  const Estimate& before = bank_.estimate(best_);
+  const double earlier = std::abs(after.x - before.x) - (after.d - before.d);
+  return dry() || (earlier > 0.0 && 2.0 * static_cast<double>(early_by_) > earlier);
+}
+
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const bool early = in.centred[best_] < 0.0;
   if (early && in.distance[best_] > kThreeSigma) {
     early_ = kLately;
-  } else if (early_ > 0) {
-    --early_;
+    early_by_ = std::max(early_by_, static_cast<float>(-in.centred[best_]));
+  } else if (early_ > 0 && --early_ == 0) {
+    early_by_ = 0.0F;
   }
   if (early && in.credit[best_] < kUnlikely) search_.alarm();
   const std::uint32_t overtaken = detector_.add(in.log_density);
   const auto jump = jumps_.judge(detector_.lead(best_));
-  // Late messages that agree by chance or by the length of a frame are no jump:
-  // it brings an early one, or none is at the floor any more.
-  const bool shows = early_ > 0 || dry();
+  const bool shows = jump == JumpWatch::Verdict::kJumped && shows_in_early(jumps_.estimate());
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
-  if (jump == JumpWatch::Verdict::kJumped && shows) {
+  if (shows) {
     bank_.start(jumps_.estimate());
     detector_.clear();
     jumps_.clear();
@@ -151,6 +159,8 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
     return;
   }
   if (jump == JumpWatch::Verdict::kWait) return;
+  // A message that waits says nothing of the clock, whichever model explains it.
+  if (!early && in.credit[best_] < kUnlikely && early_ == 0) return;
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
@@ -186,7 +196,7 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
 
 bool FloorEstimator::proven() const noexcept {
   const double members = std::min(paths_.forward.members, paths_.backward.members);
-  return found_ && members > kProven;
+  return members > kProven;
 }
 
 bool FloorEstimator::dry() const noexcept {
@@ -207,9 +217,13 @@ void FloorEstimator::mix() noexcept {
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
   if (!locked_) return {};
-  return {true,     found_,
-          mixed_.x, scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
-          mixed_.y, {paths_.forward.share, paths_.backward.share}};
+  return {true,
+          found_,
+          mixed_.x,
+          scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
+          mixed_.y,
+          scale_,
+          {paths_.forward.share, paths_.backward.share}};
 }
 
 void FloorEstimator::look() noexcept {
@@ -229,6 +243,7 @@ void FloorEstimator::begin(double scale, double wait) noexcept {
   weight_[best_] = 1.0;
   count_ = kLately;
   early_ = 0;
+  early_by_ = 0.0F;
   locked_ = adopted_ = true;
 }
 

@@ -108,6 +108,7 @@ class FloorEstimator {
   double follow(const Observation& seen) noexcept;
   [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;
+  [[nodiscard]] bool shows_in_early(const Estimate& after) const noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
   void learn(Path& path, const Bank::Innovations& in) noexcept;
   void choose() noexcept;
@@ -136,8 +137,9 @@ class FloorEstimator {
   double gain_ = 1.0;
   double said_ = 0.0;  ///< ln density of the last message
   double mean_wait_ = 0.0;
-  bool found_ = false;  ///< by a fit or by lucky messages, not begun where a path was settled
-  int early_ = 0;       ///< messages for which an early one is remembered
+  bool found_ = false;     ///< by a fit or by lucky messages, not begun where a path was settled
+  int early_ = 0;          ///< messages for which an early one is remembered
+  float early_by_ = 0.0F;  ///< ns, of the earliest that is remembered
   bool locked_ = false;
   bool adopted_ = false;
 };

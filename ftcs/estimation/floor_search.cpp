@@ -107,7 +107,9 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
     const double off = fit.estimate.x - rival.offset;
     const bool contradicts =
         off * off > kFiveSigma2 * (own + sigma * sigma) || own > kFiveSigma2 * sigma * sigma;
-    if (fit.log_likelihood - fit.said < kCertain || !contradicts) return;
+    // Where the load has grown, entries that waited are taken for a floor of much noise.
+    const bool blurred = fit.sigma() > kMuch * rival.noise;
+    if (fit.log_likelihood - fit.said < kCertain || !contradicts || blurred) return;
   }
   if (best_wanted_ > 0 && best_.offset_sigma_ns() <= sigma) return;
   best_ = fit;

@@ -33,6 +33,7 @@ class FloorSearch {
     double offset = 0.0;           ///< ns, at the last message
     double offset_sigma = 0.0;     ///< ns
     double rate = 0.0;             ///< ns per cycle
+    double noise = 0.0;            ///< ns, of one message
     PerDirection<double> share{};  ///< of messages at the floor, learnt
   };
 

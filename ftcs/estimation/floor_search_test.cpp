@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // World: two messages forward and one back in each cycle (a Sync and the two peer delay messages
 // where the neighbour is the transmitter), noise normal of 100 ns; the clock is 1 ppm slower from
-// one moment on. Or a message of each direction in each cycle, a third of them at the floor with noise
-// of 20 ns, the others 15 us late, exponential; filters that follow a line 10 us off.
+// one moment on. Or a message of each direction in each cycle, a third of them at the floor with
+// noise of 20 ns, the others 15 us late, exponential; filters that follow a line 10 us off.
 #include "ftcs/estimation/floor_search.h"
 
 #include <algorithm>
@@ -57,7 +57,7 @@ bool finds_another(FloorSearch::Rival rival, bool alarm) {
 }
 
 TEST(FloorSearch, a_floor_that_was_only_begun_does_not_end_the_search) {
-  FloorSearch::Rival rival{true, false, 10e3, 500.0, 0.0, {0.3, 0.3}};
+  FloorSearch::Rival rival{true, false, 10e3, 500.0, 0.0, 20.0, {0.3, 0.3}};
   EXPECT_TRUE(finds_another(rival, false));
   rival.found = true;
   EXPECT_FALSE(finds_another(rival, false));

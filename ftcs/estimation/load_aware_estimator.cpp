@@ -55,16 +55,6 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
-/// The first picture is far from the floor, and knows its offset much better
-/// than the floor knows its own: the record of the floor holds messages from
-/// before a step of the clock.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::overruled() const noexcept {
-  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
-  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  return kMuchSharper * noise < apart && kMuch * noise < floor_.offset_sigma_ns(0.0);
-}
-
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
@@ -133,13 +123,25 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
   return true;
 }
 
+/// The first picture knows nothing any more. A long burst of waits does that
+/// too: a floor that is believed, and in sight, goes on, and it with the floor.
+template <class Grid>
+double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
+  const bool goes_on = believed_ && !floor_.dry();
+  const double own = goes_on ? floor_.update(seen, floor_.estimate().y) : 0.0;
+  if (!goes_on || !floor_.locked()) {
+    forget_floor();
+    return 0.0;
+  }
+  explained_alone_ = 0;
+  plain_.resume(floor_.estimate(), floor_.scale());
+  return floor_.testimony().waited ? 1.0 : own;
+}
+
 template <class Grid>
 double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double credit = plain_.update(seen);
-  if (plain_.count() == 0) {  // it has given up
-    forget_floor();
-    return credit;
-  }
+  if (plain_.count() == 0) return give_up(seen);
   if (!plain_.two_way() || plain_.known_delay().known()) {
     floor_.record(seen, plain_.estimate().y);
     return credit;
@@ -166,8 +168,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
-  believed_ = floor_.locked() && lead >= -kBeyondDoubt && convinces && !overruled() &&
-              !lucky_.alike(plain_noise_ns());
+  believed_ =
+      floor_.locked() && lead >= -kBeyondDoubt && convinces && !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
 }
