@@ -123,6 +123,12 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
   return true;
 }
 
+/// That a message waited is news of the waits.
+template <class Grid>
+double LoadAwareEstimator<Grid>::believed_credit(double own) const noexcept {
+  return floor_.testimony().waited ? 1.0 : own;
+}
+
 /// The first picture knows nothing any more. A long burst of waits does that
 /// too: a floor that is believed, and in sight, goes on, and it with the floor.
 template <class Grid>
@@ -135,7 +141,7 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
   }
   explained_alone_ = 0;
   plain_.resume(floor_.estimate(), floor_.scale());
-  return floor_.testimony().waited ? 1.0 : own;
+  return believed_credit(own);
 }
 
 template <class Grid>
@@ -171,7 +177,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   believed_ =
       floor_.locked() && lead >= -kBeyondDoubt && convinces && !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
-  return floor_.testimony().waited ? 1.0 : own;  // that it waited is news of the waits
+  return believed_credit(own);
 }
 
 template <class Grid>

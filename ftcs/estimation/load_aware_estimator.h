@@ -82,6 +82,7 @@ class LoadAwareEstimator {
 
  private:
   void forget_floor() noexcept;
+  [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
   [[nodiscard]] bool knows_enough() const noexcept;
