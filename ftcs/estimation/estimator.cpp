@@ -178,7 +178,10 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     evidence_.add(innovations.distance, innovations.log_variance, credit, scale_);
   }
   if (count_ > kRepeated) heed(seen, innovations);
-  if (!follow_gate(side, credit, innovation)) return 0.0;
+  if (follow_gate(side, credit, innovation)) {
+    if (count_ == 0 || diverged_) return 0.0;
+    hear_again(seen, outliers);
+  }
   learn_noise(side, innovation, innovations);
   if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
   seek_second_opinion(seen, innovation);
@@ -226,6 +229,14 @@ void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
       if (all_mature && taken % 16 == 0) adopt_shapes();
     }
   }
+}
+
+/// Not inlined: its innovations would lie on the stack of every message.
+template <class Grid>
+[[gnu::noinline]] void Estimator<Grid>::hear_again(const Observation& seen,
+                                                   const OutlierPrior& outliers) noexcept {
+  const DelayShape& shape = shape_[seen.sign > 0.0 ? 0 : 1];
+  bank_.correct(seen, scale_, bank_.judge(seen, shape, scale_, outliers, true));
 }
 
 template <class Grid>
@@ -308,25 +319,27 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
   }
 }
 
-/// False if what was believed is worth nothing.
+/// True if this message is to be heard once more, or if what was believed is
+/// worth nothing.
 template <class Grid>
 bool Estimator<Grid>::follow_gate(std::size_t side, double credit, double innovation) noexcept {
   const Gate::Verdict verdict = gate_.observe(side, credit, innovation < 0.0, since_change_);
-  if (verdict == Gate::Verdict::kShut) return true;
+  if (verdict == Gate::Verdict::kShut) return false;
   diverged_ = verdict == Gate::Verdict::kDiverged;
-  if (diverged_) return false;
+  if (diverged_) return true;
   const double doubt = innovation * innovation / (scale_ * scale_);
   if (!(doubt < Bank::kLargestVariance)) {
     restart();
-    return false;
+    return true;
   }
+  const bool certain = verdict == Gate::Verdict::kOpenAlone;
   const bool delay_free = this->delay_free();
-  const bool clock = !delay_free || lateness_.speaks_of_clock();
+  const bool clock = !delay_free || certain || lateness_.speaks_of_clock();
   bank_.for_each([=](Estimate& e) {
     if (clock) e.xx += doubt;
     if (delay_free) e.dd += doubt;
   });
-  return true;
+  return certain;
 }
 
 template <class Grid>

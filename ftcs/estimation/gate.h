@@ -18,8 +18,10 @@ class Gate {
  public:
   enum class Verdict : std::uint8_t {
     kShut,
-    kOpen,      ///< what was believed of this direction is in doubt
-    kDiverged,  ///< nothing is as believed
+    kOpen,       ///< what was believed of this direction is in doubt
+    kOpenAlone,  ///< the same, and this message is to be heard once more: the
+                 ///< other direction fits
+    kDiverged,   ///< nothing is as believed
   };
   /// Exponential mean of what was not believed.
   void learn(std::size_t side, double credit) noexcept {
@@ -51,9 +53,10 @@ class Gate {
     // than were ever taken.
     const std::uint8_t enough = alone && since_change < kShortMemory ? kRepeated : kLately;
     if (rejected < std::max(kFew, std::min(enough, taken))) return Verdict::kShut;
+    const bool certain = alone && rejected >= enough;
     rejected = 0;
     divergence_ = {};
-    return Verdict::kOpen;
+    return certain ? Verdict::kOpenAlone : Verdict::kOpen;
   }
   /// A jump was followed: it explains what was unexplained before it.
   void explained() noexcept { divergence_ = {}; }

@@ -28,23 +28,23 @@ Verdict reject(Gate& gate, std::size_t side, bool early = false,
   return gate.observe(side, 0.0, early, since_change);
 }
 
-TEST(Gate, opens_at_the_eighth_message) {
+TEST(Gate, opens_at_the_eighth_message_and_hears_it_once_more_where_the_other_direction_fits) {
   Gate gate = clean_path();
   for (int i = 0; i < 7; ++i) {
     EXPECT_EQ(reject(gate, 0), Verdict::kShut);
     EXPECT_EQ(gate.observe(1, 1.0, false, kLongAgo), Verdict::kShut);
   }
-  EXPECT_EQ(reject(gate, 0), Verdict::kOpen);
+  EXPECT_EQ(reject(gate, 0), Verdict::kOpenAlone);
   EXPECT_EQ(reject(gate, 0), Verdict::kShut) << "counts anew";
 }
 
 TEST(Gate, opens_at_the_sixth_where_a_change_has_just_been_followed) {
   Gate gate = clean_path();
   for (int i = 0; i < 5; ++i) EXPECT_EQ(reject(gate, 0, false, 10), Verdict::kShut) << i;
-  EXPECT_EQ(reject(gate, 0, false, 10), Verdict::kOpen);
+  EXPECT_EQ(reject(gate, 0, false, 10), Verdict::kOpenAlone);
 }
 
-TEST(Gate, waits_for_eight_where_both_are_late_too) {
+TEST(Gate, waits_for_eight_where_both_are_late_too_and_hears_none_again) {
   Gate gate = clean_path();
   for (int i = 0; i < 7; ++i) {
     EXPECT_EQ(reject(gate, 0), Verdict::kShut);

@@ -55,6 +55,17 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
+/// The first picture is far from the floor, and knows its offset much better
+/// than the floor knows its own: the record of the floor holds messages from
+/// before a step of the clock.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::overruled() const noexcept {
+  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
+  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  return !floor_.proven() && kMuchSharper * noise < apart &&
+         kMuch * noise < floor_.offset_sigma_ns(0.0);
+}
+
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
@@ -174,8 +185,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
-  believed_ =
-      floor_.locked() && lead >= -kBeyondDoubt && convinces && !lucky_.alike(plain_noise_ns());
+  believed_ = floor_.locked() && lead >= -kBeyondDoubt && convinces && !overruled() &&
+              !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return believed_credit(own);
 }

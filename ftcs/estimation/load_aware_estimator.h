@@ -85,6 +85,7 @@ class LoadAwareEstimator {
   [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
+  [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
