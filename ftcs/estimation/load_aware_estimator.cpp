@@ -56,8 +56,8 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
 }
 
 /// The first picture is far from the floor, and knows its offset much better
-/// than the floor knows its own: the record of the floor holds messages from
-/// before a step of the clock.
+/// than the floor, not yet proven, knows its own: the record of the floor holds
+/// messages from before a step of the clock.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
