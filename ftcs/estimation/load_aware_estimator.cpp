@@ -37,13 +37,6 @@ double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
   return std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
 }
 
-/// A floor that has been out of sight for so long that its offset is not that
-/// sharp any more would take waits for the floor.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::knows_enough() const noexcept {
-  return floor_.offset_sigma_ns(0.0) < kSharp * std::max(floor_.mean_wait(), plain_noise_ns());
-}
-
 /// Both say the same of the offset, and the first picture, which has heard
 /// everything, knows it no worse than the fit: to believe the floor then moves
 /// nothing, and what comes late from now on will not either.
@@ -183,7 +176,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   const double lead = std::max(lead_, recent_lead_);
-  if (floor_.locked() && (!knows_enough() || lead <= -kMost)) floor_.unlock();
+  if (floor_.locked() && lead <= -kMost) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
   believed_ = floor_.locked() && lead >= -kBeyondDoubt && convinces && !overruled() &&
               !lucky_.alike(plain_noise_ns());

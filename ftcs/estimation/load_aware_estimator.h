@@ -86,7 +86,6 @@ class LoadAwareEstimator {
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
   [[nodiscard]] bool overruled() const noexcept;
-  [[nodiscard]] bool knows_enough() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   void start_floor(double wait) noexcept;
