@@ -351,7 +351,8 @@ int sigma(const Arguments& arguments) {
     if (!stated || point.time < question.get("from", 0)) continue;
     ++count;
     // A reading of the truth is whole nanoseconds. What is stated is the deviation of what was
-    // estimated; the truth is read later, after the clock has run by the rate that was to correct it.
+    // estimated; the truth is read later, after the clock has run by the rate that was to correct
+    // it.
     const double on_its_way = std::abs(stated->correction) * since;
     if (std::abs(point.error) <= 3 * stated->offset_sigma + 1 + on_its_way) ++within;
   }
