@@ -130,13 +130,12 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
 }
 
 /// Late messages that agree by chance or by the length of a frame are no jump:
-/// it makes those of one direction early by what it says, give or take a half,
-/// or none is at the floor any more.
+/// one came that is early by half of what the jump makes of it at least, or none
+/// is at the floor any more.
 bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
   const Estimate& before = bank_.estimate(best_);
   const double earlier = std::abs(after.x - before.x) - (after.d - before.d);
-  const double by = static_cast<double>(early_by_);
-  return dry() || (2.0 * by > earlier && by < 1.5 * earlier);
+  return dry() || 2.0 * static_cast<double>(early_by_) > std::abs(earlier);
 }
 
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
