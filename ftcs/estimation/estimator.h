@@ -138,8 +138,8 @@ class Estimator {
   void connect_second_direction(std::size_t side) noexcept;
   void unpin_delay(double first_sign, double variance) noexcept;
   void detect_changes(const Row& log_density, const ChangeTrust& trust) noexcept;
-  void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
   [[nodiscard]] bool follow_gate(std::size_t side, double credit, double innovation) noexcept;
+  void hear_again(const Observation& seen, const OutlierPrior& outliers) noexcept;
   void choose() noexcept;
   [[nodiscard]] double edge_bias_ns(std::size_t side) const noexcept;
   void mix() noexcept;

@@ -129,13 +129,13 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                  distance, log_density});
 }
 
-/// Late messages that agree by chance or by the length of a frame are no jump:
-/// one came that is early by half of what the jump makes of it at least, or none
-/// is at the floor any more.
+/// Late messages that agree by chance or by the length of a frame are no jump.
+/// It shows where none is at the floor any more, or where one was early by half
+/// of the jump at least: by |dx| - dd, of the direction that it makes earlier.
 bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
   const Estimate& before = bank_.estimate(best_);
-  const double earlier = std::abs(after.x - before.x) - (after.d - before.d);
-  return dry() || 2.0 * static_cast<double>(early_by_) > std::abs(earlier);
+  const double jump = std::abs(after.x - before.x) - (after.d - before.d);
+  return dry() || 2.0 * static_cast<double>(early_by_) > std::abs(jump);
 }
 
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {

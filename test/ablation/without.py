@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""without.py BUILD [NAME...] | without.py --texts: takes one mechanism of the estimator out after the other (mechanisms.toml: a piece of its source and what stands
-in its place), compiles what that changes beside the build, and runs the test or the scenario that is said to need it. That must fail.
+"""without.py BUILD [NAME...] | without.py --texts: takes one mechanism of the estimator out after the other
+(mechanisms.toml: a piece of its source and what stands in its place), compiles what that changes beside the build, and runs the test or the scenario that is said to need it. That must fail.
 What ships has no switches for it. --texts: only whether each piece stands in its source, once."""
 import concurrent.futures
 import os

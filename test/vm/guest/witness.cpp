@@ -304,29 +304,28 @@ int judge(const Arguments& arguments) {
   return verdict.good ? 0 : 1;
 }
 
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> words;
+using Words = std::vector<std::string>;
+
+Words split(const std::string& line) {
+  Words words;
   std::istringstream stream(line);
   for (std::string word; std::getline(stream, word, ',');) words.push_back(word);
   return words;
 }
-
-using Header = std::vector<std::string>;
 
 struct Statement {
   double offset_sigma = 0;  ///< ns
   double correction = 0;    ///< applied rate beyond the tracked one, ppb = ns/s
 };
 
-std::optional<double> value(const Header& header, const std::vector<std::string>& words,
-                            std::string_view name) {
+std::optional<double> value(const Words& header, const Words& words, std::string_view name) {
   const auto found = std::ranges::find(header, name);
   const auto column = static_cast<std::size_t>(found - header.begin());
   if (found == header.end() || column >= words.size() || words[column].empty()) return std::nullopt;
   return std::stod(words[column]);
 }
 
-std::optional<Statement> statement(const Header& header, const std::vector<std::string>& words) {
+std::optional<Statement> statement(const Words& header, const Words& words) {
   const auto sigma = value(header, words, "offset_sigma_ns");
   if (!sigma) return std::nullopt;
   const auto applied = value(header, words, "applied_rate_ppb");
@@ -337,22 +336,21 @@ std::optional<Statement> statement(const Header& header, const std::vector<std::
 int sigma(const Arguments& arguments) {
   const Question question = parse_question(arguments, {"target", "from", "share"});
   const std::vector<Point> points = read_points(arguments[0], question);
-  Header header;
+  Words header;
   double before = 0;
   int count = 0, within = 0;
   for (const Point& point : points) {
     const auto words = split(point.rest);
+    const double since = point.time - std::exchange(before, point.time);
     if (header.empty()) {
-      header = words;
+      if (std::ranges::find(words, "offset_sigma_ns") != words.end()) header = words;
       continue;
     }
     const auto stated = statement(header, words);
-    const double since = point.time - std::exchange(before, point.time);
     if (!stated || point.time < question.get("from", 0)) continue;
     ++count;
-    // A reading of the truth is whole nanoseconds. What is stated is the deviation of what was
-    // estimated; the truth is read later, after the clock has run by the rate that was to correct
-    // it.
+    // A reading of the truth is whole nanoseconds, and comes later than the estimate whose
+    // deviation is stated: the clock has run by the rate that was to correct it.
     const double on_its_way = std::abs(stated->correction) * since;
     if (std::abs(point.error) <= 3 * stated->offset_sigma + 1 + on_its_way) ++within;
   }
