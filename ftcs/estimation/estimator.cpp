@@ -311,7 +311,9 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
     early_.changed(alone);
     jumps_.clear();  // they were measured against what is no longer believed
     since_change_ = 0;
-    if (count_ < kYoung) {  // a bad start must leave no trace
+    if (count_ < kYoung) {  // a bad start must leave no trace, nor in the models not overtaken
+      const Estimate coped = bank_.estimate(i);
+      bank_.for_each([&coped](Estimate& e) { e = coped; });
       for (auto& learner : learner_) learner.restart();
       residuals_.clear();
       evidence_.forget();

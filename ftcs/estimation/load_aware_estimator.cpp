@@ -12,7 +12,8 @@ namespace {
 
 /// Nats. One message counts at most kConvincing; a floor just found leads by
 /// kCertain, since both directions convinced the search; above kBelieved it is
-/// followed until it falls below -kBeyondDoubt, and below -kMost it is given up.
+/// followed until it falls below -kBeyondDoubt, one not proven below
+/// -kConvincing, and below -kMost it is given up.
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
 /// Times by which one is so much sharper that the other is none.
@@ -48,15 +49,15 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
-/// The first picture is far from the floor, and knows its offset much better
-/// than the floor, not yet proven, knows its own: the record of the floor holds
-/// messages from before a step of the clock.
+/// The first picture knows its offset much better than the floor, not yet
+/// proven, knows its own, and is far from it, or messages contradict the floor:
+/// its record holds messages from before a step of the clock.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  return !floor_.proven() && kMuchSharper * noise < apart &&
-         kMuch * noise < floor_.offset_sigma_ns(0.0);
+  const bool contradicted = std::max(lead_, recent_lead_) < 0.0 || kMuchSharper * noise < apart;
+  return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
 
 /// Where messages wait the first picture is never as sharp as the waits are
@@ -120,7 +121,7 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
     return false;
   }
   lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), plain_.noise_ns(direction));
-  if (floor_.locked() || !lucky_.found(direction)) return false;
+  if (floor_.locked() || !lucky_.found(direction, plain_.noise_ns(direction))) return false;
   start_floor(lucky_.ns(direction));
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
   lead_ = recent_lead_ = kCertain;
@@ -179,7 +180,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const double lead = std::max(lead_, recent_lead_);
   if (floor_.locked() && lead <= -kMost) floor_.unlock();
   const bool convinces = believed_ || agreed || lead > kBelieved;
-  believed_ = floor_.locked() && lead >= -kBeyondDoubt && convinces && !overruled() &&
+  const double least = floor_.proven() ? -kBeyondDoubt : -kConvincing;
+  believed_ = floor_.locked() && lead >= least && convinces && !overruled() &&
               !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return believed_credit(own);

@@ -28,7 +28,8 @@ struct World {
         const bool lucky = every > 0 && i % every == 0;
         level.observe(direction, !lucky, lucky ? kLucky + normal(random) : normal(random), kNoise);
       }
-      if (level.found(Direction::kForward) || level.found(Direction::kBackward)) return i;
+      if (level.found(Direction::kForward, kNoise) || level.found(Direction::kBackward, kNoise))
+        return i;
     }
     return 0;
   }
@@ -68,14 +69,24 @@ TEST(LuckyLevel, of_both_directions_alike_is_told_from_one_that_differs) {
   EXPECT_FALSE(alike(-kLucky)) << "late";
 }
 
+TEST(LuckyLevel, within_the_early_tail_of_what_is_believed_is_none) {
+  LuckyLevel level;
+  for (int i = 1; i <= 400; ++i) {
+    level.observe(Direction::kBackward, i % 20 != 0, i % 20 == 0 ? kLucky : 0.0, kNoise);
+    level.observe(Direction::kForward, true, 0.0, kNoise);
+  }
+  EXPECT_TRUE(level.found(Direction::kBackward, kLucky / 9.0));
+  EXPECT_FALSE(level.found(Direction::kBackward, kLucky / 7.0));
+}
+
 TEST(LuckyLevel, tells_where_it_is_and_how_many_reach_it) {
   LuckyLevel level;
   for (int i = 1; i <= 400; ++i) {
     level.observe(Direction::kBackward, i % 20 != 0, i % 20 == 0 ? kLucky : 0.0, kNoise);
     level.observe(Direction::kForward, true, 0.0, kNoise);
   }
-  ASSERT_TRUE(level.found(Direction::kBackward));
-  EXPECT_FALSE(level.found(Direction::kForward));
+  ASSERT_TRUE(level.found(Direction::kBackward, kNoise));
+  EXPECT_FALSE(level.found(Direction::kForward, kNoise));
   EXPECT_NEAR(level.ns(Direction::kBackward), kLucky, 0.01);
   EXPECT_NEAR(level.share(Direction::kBackward), 0.05, 0.01);
 }

@@ -16,18 +16,19 @@ namespace ftcs::estimation {
 /// against the other.
 class StampTicks {
  public:
-  /// A message that is news (MessageOrder).
-  void observe(const TimestampPair& message) noexcept {
+  /// A message that is news (MessageOrder); `interval_ns` > 0: of the messages of one direction.
+  void observe(const TimestampPair& message, double interval_ns) noexcept {
     const Stamps to{message.reference.since_epoch().floor_ns(),
                     message.free_running.since_epoch().floor_ns()};
     Side& side = sides_[message.direction];
-    jumped_ = side.seen && jump(side.latest, to);
+    jumped_ = side.seen && jump(side.latest, to, interval_ns);
     if (side.seen) follow_ticks(side.latest, to);
     side = {to, true};
   }
   /// Whether one clock has jumped against the other before the latest message:
   /// their advances since the message before, of the same direction, differ by
-  /// more than half.
+  /// more than half, and by more than an interval: a Pdelay_Resp a millisecond after a Sync may
+  /// have waited for longer than that.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Variance that the steps of both clocks' stamps leave open where messages
   /// have noise of so much (rounding included, ns), ns^2.
@@ -51,12 +52,13 @@ class StampTicks {
     Stamps latest{};
     bool seen = false;
   };
-  [[nodiscard]] static bool jump(const Stamps& from, const Stamps& to) noexcept {
+  [[nodiscard]] static bool jump(const Stamps& from, const Stamps& to,
+                                 double interval_ns) noexcept {
     const double reference =
         static_cast<double>(to.reference) - static_cast<double>(from.reference);
     const double free =
         static_cast<double>(to.free_running) - static_cast<double>(from.free_running);
-    return std::abs(reference - free) > 0.5 * std::max(reference, free);
+    return std::abs(reference - free) > std::max(0.5 * std::max(reference, free), interval_ns);
   }
   void follow_ticks(const Stamps& from, const Stamps& to) noexcept {
     reference_tick_.observe(difference(from.reference, to.reference));
