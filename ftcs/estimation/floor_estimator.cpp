@@ -159,14 +159,17 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
     return;
   }
   if (jump == JumpWatch::Verdict::kWait) return;
-  // A message that waits says nothing of the clock, whichever model explains it.
-  if (!early && in.credit[best_] < kUnlikely && early_ == 0) return;
+  // A message that waits says nothing of the clock, whichever model explains it, unless one that
+  // was early showed as much.
+  const bool waits = !early && in.credit[best_] < kUnlikely;
+  if (waits && early_ == 0) return;
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
         detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, true})
             .source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
+    if (waits && !shows_in_early(bank_.estimate(source))) continue;
     // A model so wild that it takes waits for the floor knows nothing better.
     if (scale_ * std::sqrt(bank_.estimate(source).xx) > kSharp * mean_wait_) continue;
     bank_.set(i, bank_.estimate(source));

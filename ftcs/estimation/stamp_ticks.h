@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/tick_meter.h"
 #include "ftcs/time/per_direction.h"
 #include "ftcs/time/timestamp_pair.h"
@@ -27,8 +28,8 @@ class StampTicks {
   }
   /// Whether one clock has jumped against the other before the latest message:
   /// their advances since the message before, of the same direction, differ by
-  /// more than half, and by more than an interval: a Pdelay_Resp a millisecond after a Sync may
-  /// have waited for longer than that.
+  /// more than half, and by more than a quarter of the interval: a Pdelay_Resp a millisecond after
+  /// a Sync may have waited for longer than that.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Variance that the steps of both clocks' stamps leave open where messages
   /// have noise of so much (rounding included, ns), ns^2.
@@ -58,7 +59,8 @@ class StampTicks {
         static_cast<double>(to.reference) - static_cast<double>(from.reference);
     const double free =
         static_cast<double>(to.free_running) - static_cast<double>(from.free_running);
-    return std::abs(reference - free) > std::max(0.5 * std::max(reference, free), interval_ns);
+    return std::abs(reference - free) >
+           std::max(0.5 * std::max(reference, free), kSmallPart * interval_ns);
   }
   void follow_ticks(const Stamps& from, const Stamps& to) noexcept {
     reference_tick_.observe(difference(from.reference, to.reference));
