@@ -269,6 +269,14 @@ void Estimator<Grid>::begin_anew(const Estimate& start) noexcept {
   since_change_ = 0;
 }
 
+/// The best model has coped; without evidence any other might be chosen, and so
+/// all go on from where it stands.
+template <class Grid>
+void Estimator<Grid>::forget_evidence() noexcept {
+  evidence_.forget();
+  bank_.start(bank_.estimate(best_));
+}
+
 template <class Grid>
 void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   Estimate start = fit.estimate;
@@ -312,11 +320,9 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
     jumps_.clear();  // they were measured against what is no longer believed
     since_change_ = 0;
     if (count_ < kYoung) {  // a bad start must leave no trace, nor in the models not overtaken
-      const Estimate coped = bank_.estimate(i);
-      bank_.for_each([&coped](Estimate& e) { e = coped; });
       for (auto& learner : learner_) learner.restart();
       residuals_.clear();
-      evidence_.forget();
+      forget_evidence();
     }
   }
 }

@@ -82,11 +82,7 @@ void Estimator<Grid>::follow_scale() noexcept {
   }
   if (evidence_.messages() > kFew &&
       evidence_.mean_square(best_) > kThreeSigma * robust_scale_ * robust_scale_) {
-    // Old gross errors are all that the evidence tells. The model that has
-    // coped is right by now; without evidence any other might be chosen.
-    evidence_.forget();
-    const Estimate coped = bank_.estimate(best_);
-    bank_.for_each([&coped](Estimate& e) { e = coped; });
+    forget_evidence();  // old gross errors are all that it tells
   }
   // Fourth root of both directions' variances: the scale is their geometric
   // mean.

@@ -49,14 +49,14 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
-/// The first picture knows its offset much better than the floor, not yet
-/// proven, knows its own, and is far from it, or messages contradict the floor:
-/// its record holds messages from before a step of the clock.
+/// A floor that is not yet proven, and knows its offset much worse than the
+/// first picture does, is contradicted: by messages, or because the two are far
+/// apart. Its record holds messages from before a step of the clock.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
   const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  const bool contradicted = std::max(lead_, recent_lead_) < 0.0 || kMuchSharper * noise < apart;
+  const bool contradicted = lead() < 0.0 || kMuchSharper * noise < apart;
   return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
 
@@ -120,8 +120,9 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
     lucky_ = {};
     return false;
   }
-  lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), plain_.noise_ns(direction));
-  if (floor_.locked() || !lucky_.found(direction, plain_.noise_ns(direction))) return false;
+  const double noise = plain_.noise_ns(direction);
+  lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), noise);
+  if (floor_.locked() || !lucky_.found(direction, noise)) return false;
   start_floor(lucky_.ns(direction));
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
   lead_ = recent_lead_ = kCertain;
@@ -177,11 +178,10 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     compare(credit, own);
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
-  const double lead = std::max(lead_, recent_lead_);
-  if (floor_.locked() && lead <= -kMost) floor_.unlock();
-  const bool convinces = believed_ || agreed || lead > kBelieved;
+  if (floor_.locked() && lead() <= -kMost) floor_.unlock();
+  const bool convinces = believed_ || agreed || lead() > kBelieved;
   const double least = floor_.proven() ? -kBeyondDoubt : -kConvincing;
-  believed_ = floor_.locked() && lead >= least && convinces && !overruled() &&
+  believed_ = floor_.locked() && lead() >= least && convinces && !overruled() &&
               !lucky_.alike(plain_noise_ns());
   if (!believed_) return credit;
   return believed_credit(own);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+
 #include "ftcs/estimation/estimator.h"
 #include "ftcs/estimation/floor_estimator.h"
 #include "ftcs/estimation/lucky_level.h"
@@ -92,6 +94,7 @@ class LoadAwareEstimator {
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
+  [[nodiscard]] double lead() const noexcept { return std::max(lead_, recent_lead_); }
 
   Estimator<Grid> plain_;
   FloorEstimator floor_{};

@@ -69,22 +69,24 @@ TEST(LuckyLevel, of_both_directions_alike_is_told_from_one_that_differs) {
   EXPECT_FALSE(alike(-kLucky)) << "late";
 }
 
-TEST(LuckyLevel, within_the_early_tail_of_what_is_believed_is_none) {
+/// Backward one of twenty messages is lucky.
+LuckyLevel one_in_twenty() {
   LuckyLevel level;
   for (int i = 1; i <= 400; ++i) {
     level.observe(Direction::kBackward, i % 20 != 0, i % 20 == 0 ? kLucky : 0.0, kNoise);
     level.observe(Direction::kForward, true, 0.0, kNoise);
   }
+  return level;
+}
+
+TEST(LuckyLevel, within_the_early_tail_of_what_is_believed_is_none) {
+  const LuckyLevel level = one_in_twenty();
   EXPECT_TRUE(level.found(Direction::kBackward, kLucky / 9.0));
   EXPECT_FALSE(level.found(Direction::kBackward, kLucky / 7.0));
 }
 
 TEST(LuckyLevel, tells_where_it_is_and_how_many_reach_it) {
-  LuckyLevel level;
-  for (int i = 1; i <= 400; ++i) {
-    level.observe(Direction::kBackward, i % 20 != 0, i % 20 == 0 ? kLucky : 0.0, kNoise);
-    level.observe(Direction::kForward, true, 0.0, kNoise);
-  }
+  const LuckyLevel level = one_in_twenty();
   ASSERT_TRUE(level.found(Direction::kBackward, kNoise));
   EXPECT_FALSE(level.found(Direction::kForward, kNoise));
   EXPECT_NEAR(level.ns(Direction::kBackward), kLucky, 0.01);
