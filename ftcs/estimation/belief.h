@@ -46,6 +46,8 @@ inline constexpr double kNearlyAll = 0.9;
 
 /// Times by which one is plainly larger than another.
 inline constexpr double kMuch = 4.0;
+/// Times by which one is so much larger that the other is none beside it.
+inline constexpr double kFarLarger = 32.0;
 /// Below this part of it something is small beside another.
 inline constexpr double kSmallPart = 0.25;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -111,6 +112,10 @@ class Estimator {
   [[nodiscard]] double delay_sigma_ns() const noexcept;
   /// Noise of one timestamp of the given direction, ns.
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
+  /// Of the worse direction, ns.
+  [[nodiscard]] double spread_ns() const noexcept {
+    return std::max(noise_ns(Direction::kForward), noise_ns(Direction::kBackward));
+  }
   [[nodiscard]] KnownDelay known_delay() const noexcept {
     return delay_freed_ ? KnownDelay{} : known_delay_;
   }

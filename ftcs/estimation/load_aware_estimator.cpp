@@ -16,8 +16,6 @@ namespace {
 /// -kConvincing, and below -kMost it is given up.
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
-/// Times by which one is so much sharper that the other is none.
-constexpr double kMuchSharper = 32.0;
 /// Halves of messages that the first picture explains and the second does not:
 /// four while it is sharp, two while it is much sharper; each that both explain
 /// takes one half away, unless they are far apart.
@@ -30,12 +28,6 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
   floor_.restart();
   lead_ = recent_lead_ = 0.0;
   believed_ = false;
-}
-
-/// Of the first picture, where it is larger.
-template <class Grid>
-double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
-  return std::max(plain_.noise_ns(Direction::kForward), plain_.noise_ns(Direction::kBackward));
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -54,9 +46,9 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
 /// apart. Its record holds messages from before a step of the clock.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
-  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
+  const double noise = std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  const bool contradicted = lead() < 0.0 || kMuchSharper * noise < apart;
+  const bool contradicted = lead() < 0.0 || kFarLarger * noise < apart;
   return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
 
@@ -65,12 +57,12 @@ bool LoadAwareEstimator<Grid>::overruled() const noexcept {
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
-  const double noise = std::max(plain_noise_ns(), plain_.offset_sigma_ns(0.0));
+  const double noise = std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
-  const bool contradicts = kMuchSharper * noise < apart;
+  const bool contradicts = kFarLarger * noise < apart;
   const bool sharp =
-      contradicts || noise < kMuch * floor_.scale() || kMuchSharper * noise < floor_.mean_wait();
-  const bool sharper = kMuchSharper * noise < floor_.scale();
+      contradicts || noise < kMuch * floor_.scale() || kFarLarger * noise < floor_.mean_wait();
+  const bool sharper = kFarLarger * noise < floor_.scale();
   if (!sharp || (own > 0.5 && credit < 0.5)) {
     explained_alone_ = 0;
   } else if (credit > 0.5 && (own < 0.5 || sharper)) {
@@ -182,7 +174,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const bool convinces = believed_ || agreed || lead() > kBelieved;
   const double least = floor_.proven() ? -kBeyondDoubt : -kConvincing;
   believed_ = floor_.locked() && lead() >= least && convinces && !overruled() &&
-              !lucky_.alike(plain_noise_ns());
+              !lucky_.alike(plain_.spread_ns());
   if (!believed_) return credit;
   return believed_credit(own);
 }

@@ -69,6 +69,10 @@ class LoadAwareEstimator {
   [[nodiscard]] double noise_ns(Direction direction) const noexcept {
     return believed_ ? floor_.noise_ns(direction) : plain_.noise_ns(direction);
   }
+  /// The mean wait where messages queue, else the noise of the worse direction, ns.
+  [[nodiscard]] double spread_ns() const noexcept {
+    return believed_ ? floor_.mean_wait() : plain_.spread_ns();
+  }
   [[nodiscard]] double gain() const noexcept { return believed_ ? floor_.gain() : plain_.gain(); }
   [[nodiscard]] KnownDelay known_delay() const noexcept { return plain_.known_delay(); }
   [[nodiscard]] bool two_way() const noexcept { return plain_.two_way(); }
@@ -86,7 +90,6 @@ class LoadAwareEstimator {
   void forget_floor() noexcept;
   [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
-  [[nodiscard]] double plain_noise_ns() const noexcept;
   [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;

@@ -17,19 +17,22 @@ namespace ftcs::estimation {
 /// against the other.
 class StampTicks {
  public:
-  /// A message that is news (MessageOrder); `interval_ns` > 0: of the messages of one direction.
-  void observe(const TimestampPair& message, double interval_ns) noexcept {
+  /// A message that is news (MessageOrder). `interval_ns` > 0: of the messages of one direction;
+  /// `spread_ns`: what they are known to be off by, noise or waits, in the mean.
+  void observe(const TimestampPair& message, double interval_ns, double spread_ns) noexcept {
     const Stamps to{message.reference.since_epoch().floor_ns(),
                     message.free_running.since_epoch().floor_ns()};
     Side& side = sides_[message.direction];
-    jumped_ = side.seen && jump(side.latest, to, interval_ns);
+    jumped_ = side.seen &&
+              jump(side.latest, to, std::max(kSmallPart * interval_ns, kFarLarger * spread_ns));
     if (side.seen) follow_ticks(side.latest, to);
     side = {to, true};
   }
   /// Whether one clock has jumped against the other before the latest message:
   /// their advances since the message before, of the same direction, differ by
-  /// more than half, and by more than a quarter of the interval: a Pdelay_Resp a millisecond after
-  /// a Sync may have waited for longer than that.
+  /// more than half, by more than a quarter of the interval, since a
+  /// Pdelay_Resp a millisecond after a Sync may have waited for longer than
+  /// that, and by more than messages ever wait where they do.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Variance that the steps of both clocks' stamps leave open where messages
   /// have noise of so much (rounding included, ns), ns^2.
@@ -53,14 +56,12 @@ class StampTicks {
     Stamps latest{};
     bool seen = false;
   };
-  [[nodiscard]] static bool jump(const Stamps& from, const Stamps& to,
-                                 double interval_ns) noexcept {
+  [[nodiscard]] static bool jump(const Stamps& from, const Stamps& to, double least_ns) noexcept {
     const double reference =
         static_cast<double>(to.reference) - static_cast<double>(from.reference);
     const double free =
         static_cast<double>(to.free_running) - static_cast<double>(from.free_running);
-    return std::abs(reference - free) >
-           std::max(0.5 * std::max(reference, free), kSmallPart * interval_ns);
+    return std::abs(reference - free) > std::max(0.5 * std::max(reference, free), least_ns);
   }
   void follow_ticks(const Stamps& from, const Stamps& to) noexcept {
     reference_tick_.observe(difference(from.reference, to.reference));

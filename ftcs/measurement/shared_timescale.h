@@ -18,9 +18,15 @@ namespace ftcs {
 ///
 ///     D = response - Sync, both reference minus free-running, Sync interpolated to the response.
 ///
-/// One path, so D is noise of mean zero if the time is one. Judged is the median of the last
+/// One path, so D is noise of median zero if the time is one. Judged is the median of the last
 /// differences against its standard error by their median absolute deviation; no limit in ns, but
 /// for the resolution of stamps.
+///
+/// Of two messages that are close together one may have waited in a queue in which the other did
+/// not, or less: a response comes right behind a Sync that left 1 ms before it, and D is 1 ms. The
+/// work in a queue falls steadily and rises at once, so the median of such D is not zero. What
+/// differs by more than half of the time to the nearer Sync therefore does not count; by more than
+/// the time between two Syncs nothing waits.
 class SharedTimescale {
  public:
   enum class Verdict : std::uint8_t {
@@ -55,7 +61,7 @@ class SharedTimescale {
   [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
   /// When the last Sync came; before the first one the zero of time.
   [[nodiscard]] FreeRunningTime last_sync() const noexcept { return sync_.free_running; }
-  /// Syncs still come: without them nothing says that the time is one.
+  /// Syncs still come, and may be compared: without them nothing says that the time is one.
   [[nodiscard]] bool checked() const noexcept { return unchecked_ < kUncheckedLimit; }
   /// Median of the last differences, ns: the time that the responses show is later by this.
   [[nodiscard]] double difference_ns() const noexcept { return median_; }
@@ -69,6 +75,9 @@ class SharedTimescale {
   static constexpr double kSharedBelow = 3.0;
   /// A false alarm costs a new start: with 64 values the MAD itself may be a third too small.
   static constexpr double kForeignAbove = 8.0;
+  /// Of the differences so many count at least where the time is one: of a time that is off by as
+  /// much as the messages are apart, those alone count that noise makes small.
+  static constexpr double kClearPart = 0.25;
 
   void compare() noexcept {
     const double span = (sync_.free_running - previous_.free_running).ns();
@@ -76,9 +85,15 @@ class SharedTimescale {
     if (!has_response_ || syncs_ < 2 || ahead >= span) return;  // until the next Sync
     has_response_ = false;
     if (ahead < 0.0) return;
-    unchecked_ = 0;
     const double by_sync = (sync_.reference - previous_.reference).ns() * (ahead / span);
-    differences_[next_] = (response_.reference - previous_.reference).ns() - by_sync;
+    const double difference = (response_.reference - previous_.reference).ns() - by_sync;
+    const double off = std::abs(difference);
+    const bool clear = 2.0 * off <= std::min(ahead, span - ahead) || off > span;
+    compared_ = std::min(compared_ + 1, kWindow);
+    clear_part_ += ((clear ? 1.0 : 0.0) - clear_part_) / static_cast<double>(compared_);
+    if (!clear) return;
+    unchecked_ = 0;
+    differences_[next_] = difference;
     next_ = (next_ + 1) % kWindow;
     size_ = std::min(size_ + 1, kWindow);
     judge();
@@ -92,7 +107,7 @@ class SharedTimescale {
     const double error = kMedianError * sigma / std::sqrt(static_cast<double>(size_));
     if (size_ == kWindow && std::abs(median_) > kForeignAbove * error) {
       verdict_ = Verdict::kForeign;
-    } else if (std::abs(median_) <= kSharedBelow * error) {
+    } else if (std::abs(median_) <= kSharedBelow * error && clear_part_ >= kClearPart) {
       verdict_ = Verdict::kShared;
     }
   }
@@ -113,6 +128,8 @@ class SharedTimescale {
   std::array<double, kWindow> differences_{};
   std::size_t next_ = 0;
   std::size_t size_ = 0;
+  std::size_t compared_ = 0;
+  double clear_part_ = 0.0;  ///< of the last that could be compared
   double median_ = 0.0;
 };
 

@@ -3,6 +3,7 @@
 // two of them; our oscillator is 50 ppm fast. Each message is late by noise of its own.
 #include "ftcs/measurement/shared_timescale.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -91,6 +92,58 @@ TEST_F(SharedTimescaleTest, noise_of_any_shape_is_no_difference) {
     sync();
     for (int i = 0; i < 20'000; ++i) second(0.0);
     EXPECT_EQ(watch.verdict(), Verdict::kShared) << &shape - shapes;
+  }
+}
+
+/// How long a message waits in a queue of frames of one length that arrive at random.
+class Queue {
+ public:
+  Queue(double frame_ns, double load) : frame_(frame_ns), mean_gap_(frame_ns / load) {}
+  /// At a moment not before the last one asked for, ns.
+  double wait(double now, std::mt19937_64& random) {
+    while (next_ <= now) {
+      work_ = std::max(0.0, work_ - (next_ - then_)) + frame_;
+      then_ = next_;
+      next_ += std::exponential_distribution<double>(1.0 / mean_gap_)(random);
+    }
+    return std::max(0.0, work_ - (now - then_));
+  }
+
+ private:
+  double frame_, mean_gap_;
+  double work_ = 0.0, then_ = 0.0, next_ = 0.0;  ///< ns
+};
+
+TEST_F(SharedTimescaleTest, a_response_right_behind_a_sync_that_waited_is_no_difference) {
+  constexpr double kInterval = 15'625'000.0;
+  for (const double load : {0.2, 0.4, 0.6}) {
+    for (const double behind : {1e5, 1e6, 1.46e7}) {
+      watch.reset();
+      Queue queue{2e6, load};
+      const auto heard = [&](double sent) {
+        const double received = sent + queue.wait(sent, random) + normal(random, 20.0);
+        return pair(received * 1e-9, sent - received);
+      };
+      int shared = 0;
+      for (int i = 0; i < 20'000; ++i) {
+        watch.on_sync(heard(i * kInterval));
+        watch.on_response(heard(i * kInterval + behind));
+        ASSERT_NE(watch.verdict(), Verdict::kForeign) << load << ", " << behind << ", " << i;
+        shared += watch.verdict() == Verdict::kShared ? 1 : 0;
+      }
+      EXPECT_GT(shared, 19'000) << load << ", " << behind;
+    }
+  }
+}
+
+TEST_F(SharedTimescaleTest, a_time_that_is_off_by_as_much_as_messages_are_apart_is_not_shared) {
+  for (const double off : {30e3, 40e3, 1e6}) {
+    watch.reset();
+    for (int i = 0; i < 5'000; ++i) {
+      watch.on_sync(pair(i, normal(random, 10e3)));
+      watch.on_response(pair(i + 10e-6, off + normal(random, 10e3)));
+      ASSERT_NE(watch.verdict(), Verdict::kShared) << off << ", " << i;
+    }
   }
 }
 
