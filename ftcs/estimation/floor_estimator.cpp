@@ -81,7 +81,7 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
   }
   evidence_.add(in.distance, in.log_variance, credit, scale_);
   detect_changes(in);
-  learn(path, in);
+  learn(path, paths_[opposite(direction_of(seen))], in);
   choose();
   return credit;
 }
@@ -176,7 +176,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   }
 }
 
-void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
+void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in) noexcept {
   const double credit = in.credit[best_];
   const double nu = in.centred[best_];
   path.heard += 1.0;
@@ -192,14 +192,24 @@ void FloorEstimator::learn(Path& path, const Bank::Innovations& in) noexcept {
     const double square = std::min(nu * nu, kEightSigma * in.variance[best_]) * own;
     path.variance += credit / std::min(path.members, kLongMemory) * (square - path.variance);
   }
-  if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
-  path.dry = credit < kUnlikely ? path.dry - quick_log(1.0 - path.share) : 0.0;
+  if (nu > 0.0 && credit < 0.99) {
+    path.waits.learn(nu, 1.0 - credit);
+    recent_wait_ += (1.0 - credit) / kShortMemory * (nu - recent_wait_);
+  }
+  path.there = credit >= kUnlikely;
+  if (!path.there && path.dry == 0.0) other.there = false;
+  path.dry = path.there ? 0.0 : path.dry - quick_log(1.0 - path.share);
   if (path.dry > kSure) search_.alarm();
 }
 
 bool FloorEstimator::proven() const noexcept {
   const double members = std::min(paths_.forward.members, paths_.backward.members);
   return members > kProven;
+}
+
+bool FloorEstimator::lost() const noexcept {
+  const auto heard = [](const Path& path) { return path.dry > 0.0 || path.there; };
+  return dry() && (early_ > 0 || !heard(paths_.forward) || !heard(paths_.backward));
 }
 
 bool FloorEstimator::dry() const noexcept {
@@ -237,7 +247,7 @@ void FloorEstimator::look() noexcept {
 
 void FloorEstimator::begin(double scale, double wait) noexcept {
   scale_ = std::max(scale, least_noise_);
-  mean_wait_ = wait;
+  mean_wait_ = recent_wait_ = wait;
   evidence_.forget();
   detector_.clear();
   jumps_.clear();
@@ -255,6 +265,7 @@ void FloorEstimator::begin_path(Path& path, double share, double members) noexce
   path.variance = scale_ * scale_;
   path.members = members;
   path.heard = path.dry = 0.0;
+  path.there = false;
   path.waits.start(mean_wait_);
 }
 

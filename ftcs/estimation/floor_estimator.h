@@ -73,6 +73,9 @@ class FloorEstimator {
   [[nodiscard]] bool proven() const noexcept;
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
+  /// And waits alone do not explain it: one was early, or the other direction, which would be if a
+  /// clock had jumped, has not been heard since.
+  [[nodiscard]] bool lost() const noexcept;
 
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
@@ -80,6 +83,8 @@ class FloorEstimator {
   [[nodiscard]] double gain() const noexcept { return gain_; }
   /// ns, of those that wait, when the floor was found.
   [[nodiscard]] double mean_wait() const noexcept { return mean_wait_; }
+  /// ns, of the last that waited.
+  [[nodiscard]] double recent_wait() const noexcept { return recent_wait_; }
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
   [[nodiscard]] double share(Direction direction) const noexcept { return paths_[direction].share; }
   [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
@@ -100,8 +105,9 @@ class FloorEstimator {
     double variance = 1.0;      ///< r^2, ns^2
     double members = 0.0;       ///< messages at the floor behind the variance
     double heard = 0.0;
-    double dry = 0.0;  ///< nats: how unlikely it is that none of the last was at
-                       ///< the floor
+    double dry = 0.0;    ///< nats: how unlikely it is that none of the last was at
+                         ///< the floor
+    bool there = false;  ///< the last one was, and since the other direction is dry
     WaitDensity waits{};
   };
 
@@ -110,7 +116,7 @@ class FloorEstimator {
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;
   [[nodiscard]] bool shows_in_early(const Estimate& after) const noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
-  void learn(Path& path, const Bank::Innovations& in) noexcept;
+  void learn(Path& path, Path& other, const Bank::Innovations& in) noexcept;
   void choose() noexcept;
   void mix() noexcept;
   void look() noexcept;
@@ -137,6 +143,7 @@ class FloorEstimator {
   double gain_ = 1.0;
   double said_ = 0.0;  ///< ln density of the last message
   double mean_wait_ = 0.0;
+  double recent_wait_ = 0.0;
   bool found_ = false;     ///< by a fit or by lucky messages, not begun where a path was settled
   int early_ = 0;          ///< messages for which an early one is remembered
   float early_by_ = 0.0F;  ///< ns, of the earliest that is remembered

@@ -132,7 +132,7 @@ double LoadAwareEstimator<Grid>::believed_credit(double own) const noexcept {
 /// resumes from it.
 template <class Grid>
 double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
-  const bool goes_on = believed_ && !floor_.dry();
+  const bool goes_on = believed_ && !floor_.lost();
   const double own = goes_on ? floor_.update(seen, floor_.estimate().y) : 0.0;
   if (!goes_on || !floor_.locked()) {
     forget_floor();

@@ -71,7 +71,7 @@ class LoadAwareEstimator {
   }
   /// The mean wait where messages queue, else the noise of the worse direction, ns.
   [[nodiscard]] double spread_ns() const noexcept {
-    return believed_ ? floor_.mean_wait() : plain_.spread_ns();
+    return believed_ ? floor_.recent_wait() : plain_.spread_ns();
   }
   [[nodiscard]] double gain() const noexcept { return believed_ ? floor_.gain() : plain_.gain(); }
   [[nodiscard]] KnownDelay known_delay() const noexcept { return plain_.known_delay(); }

@@ -17,22 +17,20 @@ namespace ftcs::estimation {
 /// against the other.
 class StampTicks {
  public:
-  /// A message that is news (MessageOrder). `interval_ns` > 0: of the messages of one direction;
-  /// `spread_ns`: what they are known to be off by, noise or waits, in the mean.
-  void observe(const TimestampPair& message, double interval_ns, double spread_ns) noexcept {
+  /// A message that is news (MessageOrder). `spread_ns`: what messages are known to be off by,
+  /// noise or waits, in the mean.
+  void observe(const TimestampPair& message, double spread_ns) noexcept {
     const Stamps to{message.reference.since_epoch().floor_ns(),
                     message.free_running.since_epoch().floor_ns()};
     Side& side = sides_[message.direction];
-    jumped_ = side.seen &&
-              jump(side.latest, to, std::max(kSmallPart * interval_ns, kFarLarger * spread_ns));
+    jumped_ = side.seen && jump(side.latest, to, kFarLarger * spread_ns);
     if (side.seen) follow_ticks(side.latest, to);
     side = {to, true};
   }
   /// Whether one clock has jumped against the other before the latest message:
   /// their advances since the message before, of the same direction, differ by
-  /// more than half, by more than a quarter of the interval, since a
-  /// Pdelay_Resp a millisecond after a Sync may have waited for longer than
-  /// that, and by more than messages ever wait where they do.
+  /// more than half, and by more than messages ever wait where they do: a
+  /// Pdelay_Resp may come a millisecond after a Sync that has waited for longer.
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Variance that the steps of both clocks' stamps leave open where messages
   /// have noise of so much (rounding included, ns), ns^2.

@@ -120,7 +120,7 @@ bool BasicAdaptiveServo<Grid>::ready() const noexcept {
 template <class Grid>
 ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
                                              const ClockReading& now) noexcept {
-  ticks_.observe(pair, meter_.interval_ns(), estimator_.spread_ns());
+  ticks_.observe(pair, estimator_.spread_ns());
   const double longer = meter_.observe(pair);
   if (longer != 1.0) estimator_.rescale_time(longer);
   estimator_.expect_noise_of_at_least(ticks_.rounding_ns());
