@@ -208,8 +208,8 @@ bool FloorEstimator::proven() const noexcept {
 }
 
 bool FloorEstimator::lost() const noexcept {
-  const auto heard = [](const Path& path) { return path.dry > 0.0 || path.there; };
-  return dry() && (early_ > 0 || !heard(paths_.forward) || !heard(paths_.backward));
+  const auto speaks = [](const Path& path) { return path.dry > 0.0 || path.there; };
+  return dry() && (early_ > 0 || !speaks(paths_.forward) || !speaks(paths_.backward));
 }
 
 bool FloorEstimator::dry() const noexcept {

@@ -73,8 +73,8 @@ class FloorEstimator {
   [[nodiscard]] bool proven() const noexcept;
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
-  /// And waits alone do not explain it: one was early, or the other direction, which would be if a
-  /// clock had jumped, has not been heard since.
+  /// Dry, and waits alone do not explain it: a message was early, as one would be if a clock had
+  /// jumped, or the direction that would tell has not been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }

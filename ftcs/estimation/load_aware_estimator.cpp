@@ -128,7 +128,7 @@ double LoadAwareEstimator<Grid>::believed_credit(double own) const noexcept {
 }
 
 /// The first picture knows nothing any more. A long burst of waits does that
-/// too: a floor that is believed, and in sight, goes on, and the first picture
+/// too: a floor that is believed, and not lost, goes on, and the first picture
 /// resumes from it.
 template <class Grid>
 double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {

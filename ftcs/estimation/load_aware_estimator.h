@@ -69,7 +69,7 @@ class LoadAwareEstimator {
   [[nodiscard]] double noise_ns(Direction direction) const noexcept {
     return believed_ ? floor_.noise_ns(direction) : plain_.noise_ns(direction);
   }
-  /// The mean wait where messages queue, else the noise of the worse direction, ns.
+  /// The mean of the last waits where messages queue, else the noise of the worse direction, ns.
   [[nodiscard]] double spread_ns() const noexcept {
     return believed_ ? floor_.recent_wait() : plain_.spread_ns();
   }

@@ -147,6 +147,18 @@ TEST_F(SharedTimescaleTest, a_time_that_is_off_by_as_much_as_messages_are_apart_
   }
 }
 
+TEST_F(SharedTimescaleTest, a_time_that_departs_by_as_much_is_not_heard_any_more) {
+  const auto exchange = [&](double at, double ahead) {
+    watch.on_sync(pair(at, noise(random)));
+    watch.on_response(pair(at + 1e-3, ahead + noise(random)));
+  };
+  for (int i = 0; i < 100; ++i) exchange(i, 0.0);
+  ASSERT_EQ(watch.verdict(), Verdict::kShared);
+  EXPECT_TRUE(watch.checked());
+  for (int i = 0; i < 20; ++i) exchange(100.0 + i, 1e6);
+  EXPECT_FALSE(watch.checked());
+}
+
 TEST_F(SharedTimescaleTest, without_syncs_nothing_says_so_any_more) {
   sync();
   for (int i = 0; i < 10; ++i) second(0.0);
