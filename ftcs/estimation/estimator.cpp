@@ -17,8 +17,7 @@ constexpr std::uint32_t kEvidenceFrom = 3;
 constexpr std::uint32_t kLearnFrom = 16;
 /// Until then a change of the rate voids what was learnt, and nothing is settled.
 constexpr std::uint32_t kYoung = kFew * kShortMemory;
-/// The second opinion costs more than everything else: always early, and where
-/// what was known has just been forgotten; later every so often.
+/// The second opinion costs more than everything else: always early, later every so often.
 constexpr std::uint8_t kOpinionOften = 32;
 /// Residuals this many times below the innovations are not chance: with f
 /// degrees of freedom the probability of such luck is about (f / 2 k^2)^(f/2) /
@@ -246,7 +245,7 @@ void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innova
   if (std::max(gate_.most_rejected(), second_opinion_.serial()) >= kRepeated / 2)
     surprise_ = kOpinionOften;
   const bool fresh = count_ <= kOpinionOften || evidence_.messages() < kOpinionOften;
-  const bool due = fresh || count_ % kFew == 0 || surprise_ > 0;
+  const bool due = count_ <= kOpinionOften || count_ % kFew == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
   const bool young = fresh && second_opinion_.full();

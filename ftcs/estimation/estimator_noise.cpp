@@ -80,10 +80,6 @@ void Estimator<Grid>::follow_scale() noexcept {
   if (residuals_.size() > 0) {
     robust_scale_ = std::max(least_noise_, kMadToSigma * residuals_.median());
   }
-  if (evidence_.messages() > kFew &&
-      evidence_.mean_square(best_) > kThreeSigma * robust_scale_ * robust_scale_) {
-    forget_evidence();  // old gross errors are all that it tells
-  }
   // Fourth root of both directions' variances: the scale is their geometric
   // mean.
   double learnt = 1.0;

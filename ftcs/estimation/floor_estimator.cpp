@@ -209,7 +209,8 @@ bool FloorEstimator::proven() const noexcept {
 
 bool FloorEstimator::lost() const noexcept {
   const auto speaks = [](const Path& path) { return path.dry > 0.0 || path.there; };
-  return dry() && (early_ > 0 || !speaks(paths_.forward) || !speaks(paths_.backward));
+  const bool early = kFarLarger * static_cast<double>(early_by_) > recent_wait_;
+  return dry() && (early || !speaks(paths_.forward) || !speaks(paths_.backward));
 }
 
 bool FloorEstimator::dry() const noexcept {

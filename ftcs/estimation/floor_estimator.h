@@ -73,16 +73,15 @@ class FloorEstimator {
   [[nodiscard]] bool proven() const noexcept;
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
-  /// Dry, and waits alone do not explain it: a message was early, as one would be if a clock had
-  /// jumped, or the direction that would tell has not been heard since.
+  /// Dry, and waits alone do not explain it: a message was early by more than noise beside the
+  /// waits, as one would be if a clock had jumped, or the direction that would tell has not been
+  /// heard since.
   [[nodiscard]] bool lost() const noexcept;
 
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
   [[nodiscard]] double gain() const noexcept { return gain_; }
-  /// ns, of those that wait, when the floor was found.
-  [[nodiscard]] double mean_wait() const noexcept { return mean_wait_; }
   /// ns, of the last that waited.
   [[nodiscard]] double recent_wait() const noexcept { return recent_wait_; }
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
@@ -141,8 +140,8 @@ class FloorEstimator {
   double scale_ = 100.0;
   double least_noise_ = kLeastNoise;
   double gain_ = 1.0;
-  double said_ = 0.0;  ///< ln density of the last message
-  double mean_wait_ = 0.0;
+  double said_ = 0.0;       ///< ln density of the last message
+  double mean_wait_ = 0.0;  ///< when the floor was found
   double recent_wait_ = 0.0;
   bool found_ = false;     ///< by a fit or by lucky messages, not begun where a path was settled
   int early_ = 0;          ///< messages for which an early one is remembered

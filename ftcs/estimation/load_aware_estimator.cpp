@@ -61,7 +61,7 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
   const bool contradicts = kFarLarger * noise < apart;
   const bool sharp =
-      contradicts || noise < kMuch * floor_.scale() || kFarLarger * noise < floor_.mean_wait();
+      contradicts || noise < kMuch * floor_.scale() || kFarLarger * noise < floor_.recent_wait();
   const bool sharper = kFarLarger * noise < floor_.scale();
   if (!sharp || (own > 0.5 && credit < 0.5)) {
     explained_alone_ = 0;
@@ -168,6 +168,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
     compare(credit, own);
+    agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   if (floor_.locked() && lead() <= -kMost) floor_.unlock();
