@@ -166,7 +166,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
-        detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, true})
+        detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, false})
             .source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
     if (waits && !shows_in_early(bank_.estimate(source))) continue;
