@@ -139,7 +139,6 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
     return 0.0;
   }
   explained_alone_ = 0;
-  resumed_ = kLately;
   plain_.resume(floor_.estimate(), floor_.scale());
   return believed_credit(own);
 }
@@ -168,10 +167,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
     if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
-    if (resumed_ > 0)
-      --resumed_;
-    else
-      compare(credit, own);
+    compare(credit, own);
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));

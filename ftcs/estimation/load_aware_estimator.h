@@ -109,8 +109,6 @@ class LoadAwareEstimator {
   /// Halves of messages that the first picture explains, not the second.
   std::uint8_t explained_alone_ = 0;
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
-  /// Messages for which the first picture has just resumed: two that agree by luck make it sharp.
-  std::uint8_t resumed_ = 0;
   bool believed_ = false;
 };
 

@@ -26,8 +26,6 @@ void WaitDensity::start(double mean_wait_ns) noexcept {
     count = static_cast<float>(kStart * (above - beyond));
     above = beyond;
   }
-  // Longer ones count as the longest: else, of long waits, too little would lie in any cell.
-  count_.back() += static_cast<float>(kStart * above);
   mass_ = static_cast<float>(kStart);
   tabulate();
 }
