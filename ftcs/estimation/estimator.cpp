@@ -244,8 +244,9 @@ void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innova
   // So many rejections in a row of one direction, or innovations that hardly differ.
   if (std::max(gate_.most_rejected(), second_opinion_.serial()) >= kRepeated / 2)
     surprise_ = kOpinionOften;
-  const bool fresh = count_ <= kOpinionOften || evidence_.messages() < kOpinionOften;
-  const bool due = count_ <= kOpinionOften || count_ % kFew == 0 || surprise_ > 0;
+  const bool first = count_ <= kOpinionOften;
+  const bool fresh = first || evidence_.messages() < kOpinionOften;
+  const bool due = first || count_ % kFew == 0 || surprise_ > 0;
   if (surprise_ > 0) --surprise_;
   if (!due) return;
   const bool young = fresh && second_opinion_.full();

@@ -73,9 +73,9 @@ class FloorEstimator {
   [[nodiscard]] bool proven() const noexcept;
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
-  /// Dry, and waits alone do not explain it: a message was early by more than noise beside the
-  /// waits, as one would be if a clock had jumped, or the direction that would tell has not been
-  /// heard since.
+  /// Dry, and waits alone do not explain it: a message was early, and not by next to nothing beside
+  /// the waits, as one would be if a clock had jumped; or the direction that would tell has not
+  /// been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
@@ -141,7 +141,7 @@ class FloorEstimator {
   double least_noise_ = kLeastNoise;
   double gain_ = 1.0;
   double said_ = 0.0;       ///< ln density of the last message
-  double mean_wait_ = 0.0;  ///< when the floor was found
+  double mean_wait_ = 0.0;  ///< ns, when the floor was found
   double recent_wait_ = 0.0;
   bool found_ = false;     ///< by a fit or by lucky messages, not begun where a path was settled
   int early_ = 0;          ///< messages for which an early one is remembered

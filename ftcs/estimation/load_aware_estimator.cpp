@@ -168,6 +168,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
     compare(credit, own);
+    // More that wait would open the gate of the first picture.
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
