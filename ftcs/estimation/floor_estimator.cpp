@@ -17,6 +17,9 @@ namespace {
 /// Messages at a floor that was found, those of the fit (all but two of them at
 /// most) included.
 constexpr double kProven = 12.0;
+/// Messages of each direction, at least, after which a floor that was only surmised may be one:
+/// what is taken for waits may be a path that has changed.
+constexpr double kSurmised = kProven - 2.0;
 /// Start of the filters that hear the members of a fit once more, in units of
 /// its noise.
 constexpr double kWide = 1e4;
@@ -207,6 +210,10 @@ bool FloorEstimator::proven() const noexcept {
   return members > kProven;
 }
 
+bool FloorEstimator::surmised() const noexcept {
+  return std::min(paths_.forward.heard, paths_.backward.heard) < kSurmised;
+}
+
 bool FloorEstimator::lost() const noexcept {
   const auto speaks = [](const Path& path) { return path.dry > 0.0 || path.there; };
   const bool early = kFarLarger * static_cast<double>(early_by_) > recent_wait_;
@@ -302,6 +309,7 @@ void FloorEstimator::lower(Direction direction, double ns, double share) noexcep
   Path& path = paths_[direction];
   path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
   found_ = true;
+  for (const Direction each : kDirections) paths_[each].heard = kSurmised;
   const double sign = sign_of(direction);
   bank_.for_each([=](Estimate& e) {
     e.x -= sign * ns / 2.0;

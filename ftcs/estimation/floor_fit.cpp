@@ -11,6 +11,7 @@
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/line_sums.h"
 #include "ftcs/estimation/quick_math.h"
+#include "ftcs/estimation/wait_density.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -243,7 +244,7 @@ class Fit {
       fit.evidence = ahead ? speaks.backward : speaks.forward;
     }
     fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFew &&
-                sigma < kSharp * wait;
+                sigma < kSharp * wait && WaitDensity::holds(wait);
   }
 
   /// Nats by which the floor explains one direction better than waits without

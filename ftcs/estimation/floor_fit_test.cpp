@@ -42,6 +42,14 @@ PerDirection<RecordWindow> last(const Record& record, std::size_t wanted) {
   return {record.window(Direction::kForward, wanted), record.window(Direction::kBackward, wanted)};
 }
 
+TEST(FloorFit, finds_no_floor_where_waits_are_longer_than_their_density_holds) {
+  for (const double mean_wait : {20e6, 300e6}) {
+    World world;
+    world.mean_wait = mean_wait;
+    EXPECT_EQ(fit_floor(last(record_of(world, 128, 1), 128), 0.4).found, mean_wait < 60e6);
+  }
+}
+
 TEST(FloorFit, finds_offset_rate_and_delay_where_most_messages_wait) {
   for (const double waiting : {0.3, 0.6, 0.8}) {
     World world;

@@ -73,9 +73,11 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   explained_alone_ = std::min(explained_alone_, kExplainedAlone);
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
-  // did not wait. A floor that is not believed yet does no harm.
+  // did not wait, and noise that is a 32nd of the floor's is none of a floor. One that is not
+  // believed yet does no harm.
   const bool early = own < 0.5 && !floor_.testimony().late;
-  const bool disproven = early || floor_.dry() || (believed_ && !floor_.proven());
+  const bool disproven =
+      early || sharper || floor_.dry() || (believed_ && (!floor_.proven() || floor_.surmised()));
   if (explained_alone_ == kExplainedAlone && disproven) floor_.unlock();
 }
 
@@ -94,14 +96,17 @@ bool LoadAwareEstimator<Grid>::begins_to_wait(double credit) noexcept {
   return begins;
 }
 
+/// False: no queue makes such waits.
 template <class Grid>
-void LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
+bool LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
+  if (!WaitDensity::holds(wait)) return false;
   const PerDirection<double> noise{plain_.noise_ns(Direction::kForward),
                                    plain_.noise_ns(Direction::kBackward)};
   floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise, wait);
   lead_ = recent_lead_ = 0.0;
   explained_alone_ = 0;
   believed_ = true;
+  return true;
 }
 
 /// The first picture is settled on messages that nearly all wait for the same, in one direction:
@@ -115,7 +120,7 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
   const double noise = plain_.noise_ns(direction);
   lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), noise);
   if (floor_.locked() || !lucky_.found(direction, noise)) return false;
-  start_floor(lucky_.ns(direction));
+  if (!start_floor(lucky_.ns(direction))) return false;
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
   lead_ = recent_lead_ = kCertain;
   return true;
@@ -139,6 +144,7 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
     return 0.0;
   }
   explained_alone_ = 0;
+  resumed_ = kLately;
   plain_.resume(floor_.estimate(), floor_.scale());
   return believed_credit(own);
 }
@@ -152,13 +158,11 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     return credit;
   }
   const bool followed = floor_.locked();
+  if (resumed_ > 0) --resumed_;
   if (credit < 0.5 && !followed) floor_.wake();
   const double own = floor_.update(seen, plain_.estimate().y);
   const bool begins = begins_to_wait(credit);
-  if (begins && !floor_.locked()) {
-    start_floor(plain_.innovation_ns());
-    return credit;
-  }
+  if (begins && !floor_.locked() && start_floor(plain_.innovation_ns())) return credit;
   if (finds_lucky(direction_of(seen), credit)) return credit;
   bool agreed = false;
   if (floor_.adopted()) {
@@ -167,7 +171,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
     if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
-    compare(credit, own);
+    if (resumed_ == 0) compare(credit, own);
     // More that wait would open the gate of the first picture.
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }

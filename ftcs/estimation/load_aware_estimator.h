@@ -93,7 +93,7 @@ class LoadAwareEstimator {
   [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
-  void start_floor(double wait) noexcept;
+  [[nodiscard]] bool start_floor(double wait) noexcept;
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
@@ -109,6 +109,8 @@ class LoadAwareEstimator {
   /// Halves of messages that the first picture explains, not the second.
   std::uint8_t explained_alone_ = 0;
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
+  /// Messages for which the first picture has just resumed: two that agree by luck make it sharp.
+  std::uint8_t resumed_ = 0;
   bool believed_ = false;
 };
 

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
+
 namespace ftcs::estimation {
 
 /// Learnt density of the waits of one direction: a histogram in half octaves
@@ -18,7 +20,12 @@ namespace ftcs::estimation {
 /// of a frame as often as at its end.
 class WaitDensity {
  public:
-  /// Forgets what was learnt; mean_wait_ns above zero.
+  /// Whether it holds waits of that mean: of longer ones too few would lie in any cell, and what
+  /// has no mass has no density. Up to 67 ms.
+  [[nodiscard]] static constexpr bool holds(double mean_wait_ns) noexcept {
+    return mean_wait_ns < kMuch * kLongest;
+  }
+  /// Forgets what was learnt; mean_wait_ns above zero, and such that it holds them.
   void start(double mean_wait_ns) noexcept;
   /// A message that was late by nu > 0 ns and waited with the given
   /// probability.
@@ -30,6 +37,7 @@ class WaitDensity {
 
  private:
   static constexpr std::size_t kCells = 48;
+  static constexpr double kLongest = 1ULL << (kCells / 2);  ///< ns
 
   /// Two cells an octave; the exponent and the first bit of the mantissa of
   /// nu^2 tell which.

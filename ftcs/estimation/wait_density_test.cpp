@@ -43,6 +43,19 @@ TEST(WaitDensity, learns_what_waits_are_like) {
   EXPECT_LT(waits.at(100e3) * 12e3, 0.01);
 }
 
+TEST(WaitDensity, is_finite_for_every_mean_that_it_holds_and_holds_none_that_it_cannot) {
+  for (double mean = 1e-3; mean < 1e9 && WaitDensity::holds(mean); mean *= 1.1) {
+    WaitDensity waits;
+    waits.start(mean);
+    for (double nu = 0.1; nu < 1e12; nu *= 3.0) {
+      EXPECT_GT(waits.at(nu), 0.0) << mean;
+      EXPECT_LE(waits.at(nu), 1.0) << mean;
+    }
+  }
+  EXPECT_TRUE(WaitDensity::holds(60e6));
+  EXPECT_FALSE(WaitDensity::holds(90e6));
+}
+
 TEST(WaitDensity, any_wait_is_possible) {
   WaitDensity waits;
   waits.start(1e3);
