@@ -71,7 +71,8 @@ class FloorEstimator {
 
   /// Messages of both directions have been seen there since.
   [[nodiscard]] bool proven() const noexcept;
-  /// Too few messages have been heard since it was begun to tell waits from a path that has changed.
+  /// Too few messages have been heard since it was begun to tell waits from a path that has
+  /// changed.
   [[nodiscard]] bool surmised() const noexcept;
   /// None has been for so long that it is no chance.
   [[nodiscard]] bool dry() const noexcept;
