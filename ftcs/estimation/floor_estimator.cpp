@@ -17,8 +17,8 @@ namespace {
 /// Messages at a floor that was found, those of the fit (all but two of them at
 /// most) included.
 constexpr double kProven = 12.0;
-/// Messages of each direction, at least, after which a floor that was only surmised may be one:
-/// what is taken for waits may be a path that has changed.
+/// Messages of each direction that a new floor must have heard: until then what is taken for waits
+/// may be a path that has changed.
 constexpr double kSurmised = kProven - 2.0;
 /// Start of the filters that hear the members of a fit once more, in units of
 /// its noise.
