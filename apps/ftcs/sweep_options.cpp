@@ -178,9 +178,11 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
   command.add_option("--seeds", options.seeds, "runs of each servo (default: in the file)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--first-seed", options.first_seed, "(default: in the file)");
-  command.add_option(
-      "--servo", options.servos,
-      "only these servos (and the bound); a file is a servo of your own: .so or .py");
+  command
+      .add_option("--servo", options.servos,
+                  "only this servo (and the bound), again for each more; a file is one of your own: "
+                  ".so or .py")
+      ->allow_extra_args(false);  // what follows its name is a scenario
   command.add_flag("--medians-only", options.medians_only,
                    "do not judge worst seeds and shares (for fresh seeds)");
   command.add_option("--threads", options.threads, "0 = one for each core");

@@ -130,6 +130,12 @@ void read_limits(TomlTable& root, Scenario& scenario) {
     const bool known = std::any_of(scenario.servos.begin(), scenario.servos.end(),
                                    [&](const ScenarioServo& s) { return s.name == *servo; });
     if (!known) table.fail("servo", fmt::format("the scenario has no servo \"{}\"", *servo));
+    const bool again = std::any_of(scenario.limits.begin(), scenario.limits.end(),
+                                   [&](const ScenarioLimit& l) { return l.servo == *servo; });
+    if (again) {
+      table.fail("servo", fmt::format("\"{}\" has a limit already", *servo),
+                 "one [[limit]] holds all its figures");
+    }
     const bool has_bound = std::any_of(scenario.servos.begin(), scenario.servos.end(),
                                        [](const ScenarioServo& s) { return is_bound(s.name); });
     limit.required = table.boolean("required").value_or(true);

@@ -60,6 +60,9 @@ TEST(Scenario, mistakes_are_named_with_their_line) {
   EXPECT_NE(complaint(kSmall + "loss = \"130 %\"\n").find("out of range"), std::string::npos);
   EXPECT_NE(complaint(kSmall + "[[limit]]\nservo = \"nobody\"\n").find("no servo \"nobody\""),
             std::string::npos);
+  const std::string limit = "[[limit]]\nservo = \"ftcs\"\n";
+  EXPECT_EQ(complaint(kSmall + limit), "");
+  EXPECT_NE(complaint(kSmall + limit + limit).find("has a limit already"), std::string::npos);
   EXPECT_NE(
       complaint("network = \"ptp\"\n[run]\nsync_interval = \"0.3 s\"\ncycles = 10\n").find("2^n"),
       std::string::npos);

@@ -127,6 +127,7 @@ timeout -s INT -k 60 4 "$ftcs" simulate year.toml -q > /dev/null 2> err
 [ $? -eq 137 ] && fail "a long run did not end at SIGINT"
 grep -q interrupted err || fail "an interrupted run does not say so: $(cat err)"
 expect 2 '--servo adaptve: expected a file or one of' simulate good.toml --servo adaptve
+expect 2 '--servo adaptve: expected a file or one of' simulate --servo adaptve good.toml
 
 # Logs and records: cut off in the middle, compressed and cut off, no text at all.
 for i in $(seq 400); do echo "$i,$((i * 20000))"; done > data
