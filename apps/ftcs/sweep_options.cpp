@@ -179,9 +179,9 @@ void add_sweep_options(CLI::App& command, SweepOptions& options) {
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--first-seed", options.first_seed, "(default: in the file)");
   command
-      .add_option("--servo", options.servos,
-                  "only this servo (and the bound), again for each more; a file is one of your own: "
-                  ".so or .py")
+      .add_option(
+          "--servo", options.servos,
+          "only this servo (and the bound), again for each more; a file is your own: .so or .py")
       ->allow_extra_args(false);  // what follows its name is a scenario
   command.add_flag("--medians-only", options.medians_only,
                    "do not judge worst seeds and shares (for fresh seeds)");

@@ -69,10 +69,6 @@ class LoadAwareEstimator {
   [[nodiscard]] double noise_ns(Direction direction) const noexcept {
     return believed_ ? floor_.noise_ns(direction) : plain_.noise_ns(direction);
   }
-  /// The mean of the last waits where messages queue, else the noise of the worse direction, ns.
-  [[nodiscard]] double spread_ns() const noexcept {
-    return believed_ ? floor_.recent_wait() : plain_.spread_ns();
-  }
   [[nodiscard]] double gain() const noexcept { return believed_ ? floor_.gain() : plain_.gain(); }
   [[nodiscard]] KnownDelay known_delay() const noexcept { return plain_.known_delay(); }
   [[nodiscard]] bool two_way() const noexcept { return plain_.two_way(); }

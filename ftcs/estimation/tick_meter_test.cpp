@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: MIT
-// World: differences of timestamps that are multiples of a clock's step; messages of one direction.
+// World: differences of timestamps that are multiples of a clock's step.
 #include "ftcs/estimation/tick_meter.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
-
-#include "ftcs/estimation/stamp_ticks.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -81,46 +79,6 @@ TEST(TickMeter, what_is_hidden_is_what_a_long_mean_is_wrong_by) {
     EXPECT_LT(wrong, stated) << noise;
     EXPECT_GT(wrong, 0.7 * stated) << noise;
   }
-}
-
-TimestampPair forward(std::int64_t sent, std::int64_t heard) {
-  TimestampPair pair;
-  pair.direction = Direction::kForward;
-  pair.reference = ReferenceTime::from_ns(sent);
-  pair.free_running = FreeRunningTime::from_ns(heard);
-  return pair;
-}
-
-TEST(StampTicks, a_clock_that_leaps_against_the_other_has_jumped) {
-  StampTicks ticks;
-  ticks.observe(forward(0, 0), 100.0);
-  EXPECT_FALSE(ticks.jumped());
-  ticks.observe(forward(125'000'000, 125'000'000), 100.0);
-  EXPECT_FALSE(ticks.jumped());
-  ticks.observe(forward(1'250'000'000, 250'000'000), 100.0);
-  EXPECT_TRUE(ticks.jumped());
-  ticks.observe(forward(1'375'000'000, 375'000'000), 100.0);
-  EXPECT_FALSE(ticks.jumped());
-  ticks.observe(forward(0, 500'000'000), 100.0);
-  EXPECT_TRUE(ticks.jumped());
-}
-
-TEST(StampTicks, a_message_a_millisecond_after_another_that_waited_for_longer_is_no_jump) {
-  StampTicks ticks;
-  ticks.observe(forward(0, 0), 225e3);
-  ticks.observe(forward(1'000'000, 2'300'000), 225e3);
-  EXPECT_FALSE(ticks.jumped());
-}
-
-TEST(StampTicks, where_messages_wait_for_most_of_an_interval_one_that_does_is_no_jump) {
-  StampTicks ticks;
-  ticks.observe(forward(0, 0), 1.5e6);
-  ticks.observe(forward(15'000'000, 27'000'000), 1.5e6);
-  EXPECT_FALSE(ticks.jumped());
-  ticks.observe(forward(30'000'000, 30'000'000), 1.5e6);
-  EXPECT_FALSE(ticks.jumped());
-  ticks.observe(forward(45'000'000, 145'000'000), 1.5e6);
-  EXPECT_TRUE(ticks.jumped());
 }
 
 }  // namespace

@@ -76,7 +76,8 @@ void BasicAdaptiveServo<Grid>::forget() noexcept {
 /// A message belongs to the moment of its reference stamp. A path of D reference ns then adds
 /// sign D r, r = free running per reference, exactly: d = D r is the constant that the filters see,
 /// and no time depends on an estimate. A delay known in reference time shifts the moment instead.
-/// Time passes by the reference unless it has jumped against the free-running clock.
+/// Time passes by the reference, always: where a clock has leapt the offset is estimated anew, and
+/// what a host held up for seconds looks the same.
 template <class Grid>
 Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcept {
   const double sign = sign_of(pair.direction);
@@ -90,13 +91,10 @@ Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcep
     base_ = raw;
     started_ = true;
   } else {
-    const double elapsed =
-        ticks_.jumped() ? (pair.free_running - previous_).ns() : (event - event_).ns();
-    seen.elapsed = elapsed / meter_.interval_ns();
+    seen.elapsed = (event - event_).ns() / meter_.interval_ns();
   }
   seen.z = (raw - base_).ns();
   event_ = event;
-  previous_ = pair.free_running;
   return seen;
 }
 
@@ -120,7 +118,7 @@ bool BasicAdaptiveServo<Grid>::ready() const noexcept {
 template <class Grid>
 ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
                                              const ClockReading& now) noexcept {
-  ticks_.observe(pair, estimator_.spread_ns());
+  ticks_.observe(pair);
   const double longer = meter_.observe(pair);
   if (longer != 1.0) estimator_.rescale_time(longer);
   estimator_.expect_noise_of_at_least(ticks_.rounding_ns());

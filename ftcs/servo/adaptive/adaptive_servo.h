@@ -115,9 +115,8 @@ class BasicAdaptiveServo {
   adaptive::Steering steering_;
   estimation::IntervalMeter meter_;
   estimation::StampTicks ticks_{};
-  Duration base_{};             ///< first z: keeps the states small
-  FreeRunningTime previous_{};  ///< of the last message
-  ReferenceTime event_{};       ///< reference time to which the last message belongs
+  Duration base_{};        ///< first z: keeps the states small
+  ReferenceTime event_{};  ///< reference time to which the last message belongs
   Belief latest_{};
   ServoState state_ = ServoState::kUnlocked;
   bool started_ = false;
