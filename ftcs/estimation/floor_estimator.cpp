@@ -197,7 +197,8 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
   }
   if (nu > 0.0 && credit < 0.99) {
     path.waits.learn(nu, 1.0 - credit);
-    recent_wait_ += (1.0 - credit) / kShortMemory * (nu - recent_wait_);
+    const double wait = std::min(nu, kMuch * recent_wait_);  // not where a host stood still
+    recent_wait_ += (1.0 - credit) / kShortMemory * (wait - recent_wait_);
   }
   path.there = credit >= kUnlikely;
   if (!path.there && path.dry == 0.0) other.there = false;
