@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/estimation/jump_watch.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "ftcs/estimation/belief.h"
@@ -33,13 +34,15 @@ void JumpHypothesis::predict(const JumpMessage& message) noexcept {
   alive_ = filter_.predict(message.seen.elapsed, 0, message.process);
 }
 
-void JumpHypothesis::judge(const JumpMessage& message) noexcept {
+/// Whether the message is early under it too.
+bool JumpHypothesis::judge(const JumpMessage& message) noexcept {
   const auto said =
       filter_.judge(message.seen, message.shape, message.scale, message.outliers, true);
   filter_.correct(message.seen, message.scale, said);
   lead_ += said.log_density[0] - message.log_density;
   if (said.credit[0] > 0.5) seen_[message.seen.sign > 0.0 ? 0 : 1] = true;
   if (!filter_.healthy()) alive_ = false;
+  return message.outliers.late > kOften && said.centred[0] < 0.0 && said.distance[0] > kEightSigma;
 }
 
 /// A jump of the offset makes one direction early; where late messages are
@@ -53,17 +56,19 @@ bool JumpHypothesis::may_start(const JumpMessage& message) const noexcept {
 
 void JumpHypothesis::follow(const JumpMessage& message) noexcept {
   if (!alive_ && message.distance < kEightSigma) return;  // almost always
+  bool early = false;
   if (alive_) {
     predict(message);
-    judge(message);
+    early = judge(message);
   }
   if (message.distance < kEightSigma) {
     if (lead_ <= 0.0) alive_ = false;
   } else if (may_start(message)) {
     JumpHypothesis afresh(jumped_);
     afresh.start(message);
-    afresh.judge(message);
-    if (!alive_ || afresh.lead_ > lead_) *this = afresh;
+    (void)afresh.judge(message);
+    // Where messages wait the one that it started from may have: then one that did not is early.
+    if (!alive_ || early || afresh.lead_ > lead_) *this = afresh;
   }
   if (!alive_) clear();
 }

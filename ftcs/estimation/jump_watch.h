@@ -53,7 +53,7 @@ class JumpHypothesis {
   [[nodiscard]] bool may_start(const JumpMessage& message) const noexcept;
   void start(const JumpMessage& message) noexcept;
   void predict(const JumpMessage& message) noexcept;
-  void judge(const JumpMessage& message) noexcept;
+  bool judge(const JumpMessage& message) noexcept;
 
   ModelBank<OneModel> filter_{};
   double lead_ = 0.0;
