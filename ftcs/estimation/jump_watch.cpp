@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ftcs/estimation/jump_watch.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "ftcs/estimation/belief.h"
@@ -34,7 +33,6 @@ void JumpHypothesis::predict(const JumpMessage& message) noexcept {
   alive_ = filter_.predict(message.seen.elapsed, 0, message.process);
 }
 
-/// Whether the message is early under it too.
 bool JumpHypothesis::judge(const JumpMessage& message) noexcept {
   const auto said =
       filter_.judge(message.seen, message.shape, message.scale, message.outliers, true);
@@ -68,7 +66,7 @@ void JumpHypothesis::follow(const JumpMessage& message) noexcept {
     afresh.start(message);
     (void)afresh.judge(message);
     // Where messages wait the one that it started from may have: then one that did not is early.
-    if (!alive_ || early || afresh.lead_ > lead_) *this = afresh;
+    if (!alive_ || (early && afresh.alive_) || afresh.lead_ > lead_) *this = afresh;
   }
   if (!alive_) clear();
 }

@@ -28,7 +28,9 @@ struct JumpMessage {
 /// that fitted and the first that did not. It starts from what was believed,
 /// with the variance nu^2 of that first message added to what has jumped, and
 /// goes on as a filter of its own; `lead` is what speaks for it, the logarithm
-/// of a likelihood ratio with the prior in it.
+/// of a likelihood ratio with the prior in it. Where messages wait usually it
+/// begins anew from one that is early by eight sigma under it: the first may
+/// have waited.
 class JumpHypothesis {
  public:
   enum class Of : std::uint8_t { kOffset, kDelay };
@@ -53,6 +55,7 @@ class JumpHypothesis {
   [[nodiscard]] bool may_start(const JumpMessage& message) const noexcept;
   void start(const JumpMessage& message) noexcept;
   void predict(const JumpMessage& message) noexcept;
+  /// Whether it is early by eight sigma where messages wait usually.
   bool judge(const JumpMessage& message) noexcept;
 
   ModelBank<OneModel> filter_{};
