@@ -55,7 +55,7 @@ class JumpHypothesis {
   [[nodiscard]] bool may_start(const JumpMessage& message) const noexcept;
   void start(const JumpMessage& message) noexcept;
   void predict(const JumpMessage& message) noexcept;
-  /// Whether it is early by eight sigma where messages wait usually.
+  /// Hears it. Returns whether it is early by eight sigma where messages wait usually.
   bool judge(const JumpMessage& message) noexcept;
 
   ModelBank<OneModel> filter_{};
