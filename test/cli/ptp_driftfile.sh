@@ -30,8 +30,16 @@ grep -q "driftfile $drift: not there yet" "$folder/first.log" || fail "no word o
 wait $unwritable || fail "a driftfile that cannot be written must not end the run"
 [ "$(grep -c 'driftfile: cannot write /proc/ftcs-drift' "$folder/unwritable.log")" -eq 1 ] ||
   fail "one warning for a driftfile that cannot be written"
-# Not in the middle of a write, which would leave the file that is being written.
-for _ in $(seq 50); do [ -z "$(find "$folder" -name 'killed.?*' ! -name '*.log')" ] && break; sleep 0.02; done
+# Not in the middle of a write, whose file stays: it is stopped, looked at, and let go on for as long as one is there.
+temporary() { find "$folder" -name 'drift.*' -o -name 'killed.?*' ! -name '*.log'; }
+for _ in $(seq 100); do
+  kill -STOP $killed
+  # Every thread of it, out of every system call.
+  while grep -h '^State:' /proc/$killed/task/*/status | grep -qv '[TZ] ('; do sleep 0.01; done
+  [ -z "$(temporary)" ] && break
+  kill -CONT $killed
+  sleep 0.02
+done
 kill -KILL $killed
 python3 -c '
 import json, sys
@@ -39,7 +47,7 @@ for name in sys.argv[1:]:
     rate = json.load(open(name))["rate_ppb"]
     assert 40e3 < rate < 60e3, f"{name}: {rate} ppb of a clock that is 50 ppm fast"
 ' "$drift" "$folder/killed" || fail "the learnt rate"
-[ "$(find "$folder" -name 'drift.*' -o -name 'killed.?*' ! -name '*.log' | wc -l)" -eq 0 ] || fail "temporary files are left"
+[ -z "$(temporary)" ] || fail "temporary files are left"
 
 # The same clock again; then files that must not be used.
 head -c 60 "$drift" > "$folder/cut"
