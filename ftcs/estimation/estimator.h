@@ -119,6 +119,8 @@ class Estimator {
   [[nodiscard]] KnownDelay known_delay() const noexcept {
     return delay_freed_ ? KnownDelay{} : known_delay_;
   }
+  /// It was, at first: what is estimated since is what differs from it.
+  [[nodiscard]] bool delay_was_known() const noexcept { return known_delay_.known(); }
   /// Messages of both directions have come.
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }
   /// Messages since the last start.

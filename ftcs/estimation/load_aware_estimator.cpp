@@ -17,9 +17,17 @@ namespace {
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
 /// Halves of messages that the first picture explains and the second does not:
-/// four while it is sharp, two while it is much sharper; each that both explain
-/// takes one half away, unless they are far apart.
-constexpr std::uint8_t kExplainedAlone = 2 * kFew;
+/// four while it is sharp, two while it is much sharper, more while it is less
+/// so; each that both explain takes one half away, unless they are far apart.
+constexpr float kExplainedAlone = 2 * kFew;
+
+/// How much smaller `noise` is than `other`: 1 from kFarLarger times on, 0 up to a kMuch-th of
+/// that, between by the logarithm. So many messages agree by luck with a probability that is the
+/// noise as a part of the other, to the power of their number.
+double sharpness(double other, double noise) noexcept {
+  const double ratio = kMuch / kFarLarger * other / noise;
+  return ratio > 1.0 ? std::min(1.0, quick_log(ratio) / quick_log(kMuch)) : 0.0;
+}
 
 }  // namespace
 
@@ -52,6 +60,16 @@ bool LoadAwareEstimator<Grid>::overruled() const noexcept {
   return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
 
+/// Messages at such a floor would arrive before they were sent, by more than latencies of stamps
+/// that nobody calibrated make: a part of what messages wait.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::impossible() const noexcept {
+  const double early = -floor_.estimate().d;
+  const double sigma = floor_.delay_sigma_ns();
+  return !plain_.delay_was_known() && early > kSmallPart * floor_.recent_wait() &&
+         early * early > kFiveSigma2 * sigma * sigma;
+}
+
 /// Where messages wait the first picture is never as sharp as the waits are
 /// long, nor as it is wrong. If it is, and explains what the floor does not, or
 /// is much sharper than the floor, the floor is none.
@@ -60,25 +78,30 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise = std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
   const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
   const bool contradicts = kFarLarger * noise < apart;
-  const bool sharp =
-      contradicts || noise < kMuch * floor_.scale() || kFarLarger * noise < floor_.recent_wait();
-  const bool sharper = kFarLarger * noise < floor_.scale();
-  if (!sharp || (own > 0.5 && credit < 0.5)) {
-    explained_alone_ = 0;
-  } else if (credit > 0.5 && (own < 0.5 || sharper)) {
-    explained_alone_ = static_cast<std::uint8_t>(explained_alone_ + (sharper ? 4U : 2U));
-  } else if (own > 0.5 && explained_alone_ > 0 && !contradicts) {
-    --explained_alone_;
+  const double sharp = noise < kMuch * floor_.scale()
+                           ? 1.0
+                           : sharpness(std::max(apart, floor_.recent_wait()), noise);
+  const double sharper = sharpness(floor_.scale(), noise);
+  const bool off = credit < 0.5;
+  // One that is not so sharp must explain one message after the other.
+  const bool interrupted = sharp < 1.0 && (off || off_);
+  off_ = off;
+  if (sharp <= 0.0 || interrupted || (own > 0.5 && off)) {
+    explained_alone_ = 0.0F;
+  } else if (!off && (own < 0.5 || sharper > 0.0)) {
+    explained_alone_ += static_cast<float>(std::max(4.0 * sharper, own < 0.5 ? 2.0 * sharp : 0.0));
+  } else if (own > 0.5 && !contradicts) {
+    explained_alone_ = std::max(explained_alone_ - 1.0F, 0.0F);
   }
   explained_alone_ = std::min(explained_alone_, kExplainedAlone);
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
-  // did not wait, and noise that is a 32nd of the floor's is none of a floor. One that is not
+  // did not wait, and noise far smaller than the floor's is none of a floor. One that is not
   // believed yet does no harm.
   const bool early = own < 0.5 && !floor_.testimony().late;
-  const bool disproven =
-      early || sharper || floor_.dry() || (believed_ && (!floor_.proven() || floor_.surmised()));
-  if (explained_alone_ == kExplainedAlone && disproven) floor_.unlock();
+  const bool disproven = early || sharper > 0.0 || floor_.dry() ||
+                         (believed_ && (!floor_.proven() || floor_.surmised()));
+  if (explained_alone_ >= kExplainedAlone && disproven) floor_.unlock();
 }
 
 /// On a path that was settled: a second message of the last few that is late by
@@ -104,7 +127,7 @@ bool LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
                                    plain_.noise_ns(Direction::kBackward)};
   floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise, wait);
   lead_ = recent_lead_ = 0.0;
-  explained_alone_ = 0;
+  explained_alone_ = 0.0F;
   believed_ = true;
   return true;
 }
@@ -143,7 +166,7 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
     forget_floor();
     return 0.0;
   }
-  explained_alone_ = 0;
+  explained_alone_ = 0.0F;
   resumed_ = kLately;
   plain_.resume(floor_.estimate(), floor_.scale());
   return believed_credit(own);
@@ -166,7 +189,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (finds_lucky(direction_of(seen), credit)) return credit;
   bool agreed = false;
   if (floor_.adopted()) {
-    explained_alone_ = 0;
+    explained_alone_ = 0.0F;
     agreed = agree();
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
     if (!believed_) lead_ = recent_lead_ = kCertain;
@@ -176,7 +199,7 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
-  if (floor_.locked() && lead() <= -kMost) floor_.unlock();
+  if (floor_.locked() && (lead() <= -kMost || impossible())) floor_.unlock();
   const bool convinces = believed_ || agreed || lead() > kBelieved;
   const double least = floor_.proven() ? -kBeyondDoubt : -kConvincing;
   believed_ = floor_.locked() && lead() >= least && convinces && !overruled() &&

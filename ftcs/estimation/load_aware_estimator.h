@@ -88,6 +88,7 @@ class LoadAwareEstimator {
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
   [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
+  [[nodiscard]] bool impossible() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   [[nodiscard]] bool start_floor(double wait) noexcept;
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
@@ -103,10 +104,11 @@ class LoadAwareEstimator {
   /// q: a density that has learnt nothing yet says little.
   PerDirection<double> learnt_part_{kNowAndThen, kNowAndThen};
   /// Halves of messages that the first picture explains, not the second.
-  std::uint8_t explained_alone_ = 0;
+  float explained_alone_ = 0.0F;
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
   /// Messages for which the first picture has just resumed: two that agree by luck make it sharp.
   std::uint8_t resumed_ = 0;
+  bool off_ = false;  ///< the first picture did not explain the last message
   bool believed_ = false;
 };
 
