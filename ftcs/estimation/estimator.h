@@ -119,7 +119,7 @@ class Estimator {
   [[nodiscard]] KnownDelay known_delay() const noexcept {
     return delay_freed_ ? KnownDelay{} : known_delay_;
   }
-  /// It was, at first: what is estimated since is what differs from it.
+  /// A delay was given at first: what is estimated since is the difference to it, of either sign.
   [[nodiscard]] bool delay_was_known() const noexcept { return known_delay_.known(); }
   /// Messages of both directions have come.
   [[nodiscard]] bool two_way() const noexcept { return seen_[0] && seen_[1]; }

@@ -22,14 +22,26 @@ constexpr double kMost = kBeyondDoubt + kCertain;
 constexpr float kExplainedAlone = 2 * kFew;
 
 /// How much smaller `noise` is than `other`: 1 from kFarLarger times on, 0 up to a kMuch-th of
-/// that, between by the logarithm. So many messages agree by luck with a probability that is the
-/// noise as a part of the other, to the power of their number.
+/// that, between them by the logarithm: n messages agree by luck with the probability
+/// (noise / other)^n.
 double sharpness(double other, double noise) noexcept {
   const double ratio = kMuch / kFarLarger * other / noise;
   return ratio > 1.0 ? std::min(1.0, quick_log(ratio) / quick_log(kMuch)) : 0.0;
 }
 
 }  // namespace
+
+/// Of one message by the first picture, or of what it believes, if that is worse.
+template <class Grid>
+double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
+  return std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
+}
+
+/// By how much the two differ in the offset.
+template <class Grid>
+double LoadAwareEstimator<Grid>::apart_ns() const noexcept {
+  return std::abs(floor_.estimate().x - plain_.estimate().x);
+}
 
 template <class Grid>
 void LoadAwareEstimator<Grid>::forget_floor() noexcept {
@@ -43,7 +55,7 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
 /// nothing, and what comes late from now on will not either.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
-  const double apart = floor_.estimate().x - plain_.estimate().x;
+  const double apart = apart_ns();
   const double floor = floor_.offset_sigma_ns(0.0);
   const double plain = plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
@@ -54,8 +66,8 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
 /// apart. Its record holds messages from before a step of the clock.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::overruled() const noexcept {
-  const double noise = std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
-  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const double noise = plain_noise_ns();
+  const double apart = apart_ns();
   const bool contradicted = lead() < 0.0 || kFarLarger * noise < apart;
   return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
 }
@@ -75,8 +87,8 @@ bool LoadAwareEstimator<Grid>::impossible() const noexcept {
 /// is much sharper than the floor, the floor is none.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
-  const double noise = std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
-  const double apart = std::abs(floor_.estimate().x - plain_.estimate().x);
+  const double noise = plain_noise_ns();
+  const double apart = apart_ns();
   const bool contradicts = kFarLarger * noise < apart;
   const double sharp = noise < kMuch * floor_.scale()
                            ? 1.0

@@ -84,6 +84,8 @@ class LoadAwareEstimator {
 
  private:
   void forget_floor() noexcept;
+  [[nodiscard]] double plain_noise_ns() const noexcept;
+  [[nodiscard]] double apart_ns() const noexcept;
   [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
   [[nodiscard]] bool overruled() const noexcept;
@@ -108,7 +110,7 @@ class LoadAwareEstimator {
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
   /// Messages for which the first picture has just resumed: two that agree by luck make it sharp.
   std::uint8_t resumed_ = 0;
-  bool off_ = false;  ///< the first picture did not explain the last message
+  bool off_ = false;  ///< the first picture did not explain the last one that was compared
   bool believed_ = false;
 };
 
