@@ -269,14 +269,6 @@ void Estimator<Grid>::begin_anew(const Estimate& start) noexcept {
   since_change_ = 0;
 }
 
-/// The best model has coped; without evidence any other might be chosen, and so
-/// all go on from where it stands.
-template <class Grid>
-void Estimator<Grid>::forget_evidence() noexcept {
-  evidence_.forget();
-  bank_.start(bank_.estimate(best_));
-}
-
 template <class Grid>
 void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   Estimate start = fit.estimate;
@@ -319,10 +311,10 @@ void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& 
     early_.changed(alone);
     jumps_.clear();  // they were measured against what is no longer believed
     since_change_ = 0;
-    if (count_ < kYoung) {  // a bad start must leave no trace, nor in the models not overtaken
+    if (count_ < kYoung) {  // a bad start must leave no trace
       for (auto& learner : learner_) learner.restart();
       residuals_.clear();
-      forget_evidence();
+      evidence_.forget();
     }
   }
 }

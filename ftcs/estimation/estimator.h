@@ -154,7 +154,6 @@ class Estimator {
   void adopt_shapes() noexcept;
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
   void begin_anew(const Estimate& start) noexcept;
-  void forget_evidence() noexcept;
   void start_again(const FreshFit& fit) noexcept;
   [[nodiscard]] bool observable() const noexcept;
   /// The path delay is estimated, not given or pinned.

@@ -138,7 +138,7 @@ void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
 bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
   const Estimate& before = bank_.estimate(best_);
   const double jump = std::abs(after.x - before.x) - (after.d - before.d);
-  return dry() || 2.0 * static_cast<double>(early_by_) > std::abs(jump);
+  return dry(kSure) || 2.0 * static_cast<double>(early_by_) > std::abs(jump);
 }
 
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
@@ -195,11 +195,7 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
     const double square = std::min(nu * nu, kEightSigma * in.variance[best_]) * own;
     path.variance += credit / std::min(path.members, kLongMemory) * (square - path.variance);
   }
-  if (nu > 0.0 && credit < 0.99) {
-    path.waits.learn(nu, 1.0 - credit);
-    const double wait = std::min(nu, kMuch * recent_wait_);  // not where a host stood still
-    recent_wait_ += (1.0 - credit) / kShortMemory * (wait - recent_wait_);
-  }
+  if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
   path.there = credit >= kUnlikely;
   if (!path.there && path.dry == 0.0) other.there = false;
   path.dry = path.there ? 0.0 : path.dry - quick_log(1.0 - path.share);
@@ -217,12 +213,12 @@ bool FloorEstimator::surmised() const noexcept {
 
 bool FloorEstimator::lost() const noexcept {
   const auto speaks = [](const Path& path) { return path.dry > 0.0 || path.there; };
-  const bool early = kFarLarger * static_cast<double>(early_by_) > recent_wait_;
-  return dry() && (early || !speaks(paths_.forward) || !speaks(paths_.backward));
+  const bool early = kFarLarger * static_cast<double>(early_by_) > mean_wait_;
+  return dry(kSure) && (early || !speaks(paths_.forward) || !speaks(paths_.backward));
 }
 
-bool FloorEstimator::dry() const noexcept {
-  return paths_.forward.dry + paths_.backward.dry > kSure;
+bool FloorEstimator::dry(double nats) const noexcept {
+  return paths_.forward.dry + paths_.backward.dry > nats;
 }
 
 void FloorEstimator::choose() noexcept {
@@ -256,7 +252,7 @@ void FloorEstimator::look() noexcept {
 
 void FloorEstimator::begin(double scale, double wait) noexcept {
   scale_ = std::max(scale, least_noise_);
-  mean_wait_ = recent_wait_ = wait;
+  mean_wait_ = wait;
   evidence_.forget();
   detector_.clear();
   jumps_.clear();

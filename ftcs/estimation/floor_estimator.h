@@ -74,8 +74,8 @@ class FloorEstimator {
   /// Too few messages have been heard since it was begun to tell waits from a path that has
   /// changed.
   [[nodiscard]] bool surmised() const noexcept;
-  /// None has been for so long that it is no chance.
-  [[nodiscard]] bool dry() const noexcept;
+  /// None has been for so long that it is no chance, by so many nats.
+  [[nodiscard]] bool dry(double nats) const noexcept;
   /// Dry, and waits alone do not explain it: a message was early, and not by next to nothing beside
   /// the waits, as one would be if a clock had jumped; or the direction that would tell has not
   /// been heard since.
@@ -85,8 +85,8 @@ class FloorEstimator {
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
   [[nodiscard]] double gain() const noexcept { return gain_; }
-  /// ns, of the last that waited.
-  [[nodiscard]] double recent_wait() const noexcept { return recent_wait_; }
+  /// ns, of the messages that waited when the floor was found.
+  [[nodiscard]] double mean_wait() const noexcept { return mean_wait_; }
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
   [[nodiscard]] double share(Direction direction) const noexcept { return paths_[direction].share; }
   [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
@@ -145,10 +145,9 @@ class FloorEstimator {
   double gain_ = 1.0;
   double said_ = 0.0;       ///< ln density of the last message
   double mean_wait_ = 0.0;  ///< ns, when the floor was found
-  double recent_wait_ = 0.0;
-  bool found_ = false;     ///< by a fit or by lucky messages, not begun where a path was settled
-  int early_ = 0;          ///< messages for which an early one is remembered
-  float early_by_ = 0.0F;  ///< ns, of the earliest that is remembered
+  bool found_ = false;      ///< by a fit or by lucky messages, not begun where a path was settled
+  int early_ = 0;           ///< messages for which an early one is remembered
+  float early_by_ = 0.0F;   ///< ns, of the earliest that is remembered
   bool locked_ = false;
   bool adopted_ = false;
 };

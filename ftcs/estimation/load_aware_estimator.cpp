@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/quick_math.h"
@@ -12,22 +13,9 @@ namespace {
 
 /// Nats. One message counts at most kConvincing; a floor just found leads by
 /// kCertain, since both directions convinced the search; above kBelieved it is
-/// followed until it falls below -kBeyondDoubt, one not proven below
-/// -kConvincing, and below -kMost it is given up.
+/// followed until it falls below -kBeyondDoubt, and below -kMost it is given up.
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
-/// Halves of messages that the first picture explains and the second does not:
-/// four while it is sharp, two while it is much sharper, more while it is less
-/// so; each that both explain takes one half away, unless they are far apart.
-constexpr float kExplainedAlone = 2 * kFew;
-
-/// How much smaller `noise` is than `other`: 1 from kFarLarger times on, 0 up to a kMuch-th of
-/// that, between them by the logarithm: n messages agree by luck with the probability
-/// (noise / other)^n.
-double sharpness(double other, double noise) noexcept {
-  const double ratio = kMuch / kFarLarger * other / noise;
-  return ratio > 1.0 ? std::min(1.0, quick_log(ratio) / quick_log(kMuch)) : 0.0;
-}
 
 }  // namespace
 
@@ -61,59 +49,49 @@ bool LoadAwareEstimator<Grid>::agree() const noexcept {
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
-/// A floor that is not yet proven, and knows its offset much worse than the
-/// first picture does, is contradicted: by messages, or because the two are far
-/// apart. Its record holds messages from before a step of the clock.
-template <class Grid>
-bool LoadAwareEstimator<Grid>::overruled() const noexcept {
-  const double noise = plain_noise_ns();
-  const double apart = apart_ns();
-  const bool contradicted = lead() < 0.0 || kFarLarger * noise < apart;
-  return !floor_.proven() && contradicted && kMuch * noise < floor_.offset_sigma_ns(0.0);
-}
-
 /// Messages at such a floor would arrive before they were sent, by more than latencies of stamps
 /// that nobody calibrated make: a part of what messages wait.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::impossible() const noexcept {
   const double early = -floor_.estimate().d;
   const double sigma = floor_.delay_sigma_ns();
-  return !plain_.delay_was_known() && early > kSmallPart * floor_.recent_wait() &&
+  return !plain_.delay_was_known() && early > kSmallPart * floor_.mean_wait() &&
          early * early > kFiveSigma2 * sigma * sigma;
 }
 
-/// Where messages wait the first picture is never as sharp as the waits are
-/// long, nor as it is wrong. If it is, and explains what the floor does not, or
-/// is much sharper than the floor, the floor is none.
+/// By how many nats the first picture predicts the last message better than the floor and its
+/// waits do. What is no density, or one of nothing, says no more than one message may.
+template <class Grid>
+double LoadAwareEstimator<Grid>::predicted_better() const noexcept {
+  const FloorEstimator::Testimony& said = floor_.testimony();
+  const double density = said.share * said.at_floor + (1.0 - said.share) * said.waiting;
+  const double gain =
+      plain_.log_density() - quick_log(std::max(density, std::numeric_limits<double>::min()));
+  return std::clamp(gain, -kConvincing, kConvincing);
+}
+
+/// While the two contradict each other a contest is held: each predicts every message before it is
+/// heard, S = max(0, S + ln p / (w N + (1 - w) T)), nats (a cumulative sum, Page, Biometrika 41,
+/// 1954). A picture that is sharp by luck does not stay ahead; one that is right gains ten nats a
+/// message, since waits are predicted badly.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise = plain_noise_ns();
-  const double apart = apart_ns();
-  const bool contradicts = kFarLarger * noise < apart;
-  const double sharp = noise < kMuch * floor_.scale()
-                           ? 1.0
-                           : sharpness(std::max(apart, floor_.recent_wait()), noise);
-  const double sharper = sharpness(floor_.scale(), noise);
-  const bool off = credit < 0.5;
-  // One that is not so sharp must explain one message after the other.
-  const bool interrupted = sharp < 1.0 && (off || off_);
-  off_ = off;
-  if (sharp <= 0.0 || interrupted || (own > 0.5 && off)) {
-    explained_alone_ = 0.0F;
-  } else if (!off && (own < 0.5 || sharper > 0.0)) {
-    explained_alone_ += static_cast<float>(std::max(4.0 * sharper, own < 0.5 ? 2.0 * sharp : 0.0));
-  } else if (own > 0.5 && !contradicts) {
-    explained_alone_ = std::max(explained_alone_ - 1.0F, 0.0F);
-  }
-  explained_alone_ = std::min(explained_alone_, kExplainedAlone);
+  const bool finer = kMuch * noise < floor_.scale();
+  const bool vague = noise > kMuch * floor_.scale();
+  const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart_ns();
+  contest_ = contradicts ? std::max(0.0, contest_ + predicted_better()) : 0.0;
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
-  // did not wait, and noise far smaller than the floor's is none of a floor. One that is not
-  // believed yet does no harm.
-  const bool early = own < 0.5 && !floor_.testimony().late;
-  const bool disproven = early || sharper > 0.0 || floor_.dry() ||
-                         (believed_ && (!floor_.proven() || floor_.surmised()));
-  if (explained_alone_ >= kExplainedAlone && disproven) floor_.unlock();
+  // did not wait; where the clock has jumped the floor finds that sooner than a vague picture
+  // does. Noise far smaller than the floor's is none of a floor. One that is not believed yet does
+  // no harm.
+  const bool early = own < 0.5 && !floor_.testimony().late && !vague;
+  const bool dry = floor_.dry(kConvincing);
+  const bool young = !floor_.proven() || floor_.surmised();
+  const double enough = young && dry ? kConvincing : kCertain;
+  const bool disproven = early || finer || dry || (believed_ && young);
+  if (contest_ > enough && (credit > 0.5 || early) && disproven) floor_.unlock();
 }
 
 /// On a path that was settled: a second message of the last few that is late by
@@ -139,7 +117,7 @@ bool LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
                                    plain_.noise_ns(Direction::kBackward)};
   floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise, wait);
   lead_ = recent_lead_ = 0.0;
-  explained_alone_ = 0.0F;
+  contest_ = 0.0;
   believed_ = true;
   return true;
 }
@@ -178,8 +156,7 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
     forget_floor();
     return 0.0;
   }
-  explained_alone_ = 0.0F;
-  resumed_ = kLately;
+  contest_ = 0.0;
   plain_.resume(floor_.estimate(), floor_.scale());
   return believed_credit(own);
 }
@@ -193,7 +170,6 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     return credit;
   }
   const bool followed = floor_.locked();
-  if (resumed_ > 0) --resumed_;
   if (credit < 0.5 && !followed) floor_.wake();
   const double own = floor_.update(seen, plain_.estimate().y);
   const bool begins = begins_to_wait(credit);
@@ -201,21 +177,20 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (finds_lucky(direction_of(seen), credit)) return credit;
   bool agreed = false;
   if (floor_.adopted()) {
-    explained_alone_ = 0.0F;
+    contest_ = 0.0;
     agreed = agree();
     if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
     if (!believed_) lead_ = recent_lead_ = kCertain;
   } else if (followed && floor_.locked()) {
-    if (resumed_ == 0) compare(credit, own);
+    compare(credit, own);
     // More that wait would open the gate of the first picture.
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) follow_lead(direction_of(seen));
   if (floor_.locked() && (lead() <= -kMost || impossible())) floor_.unlock();
   const bool convinces = believed_ || agreed || lead() > kBelieved;
-  const double least = floor_.proven() ? -kBeyondDoubt : -kConvincing;
-  believed_ = floor_.locked() && lead() >= least && convinces && !overruled() &&
-              !lucky_.alike(plain_.spread_ns());
+  believed_ =
+      floor_.locked() && lead() >= -kBeyondDoubt && convinces && !lucky_.alike(plain_.spread_ns());
   if (!believed_) return credit;
   return believed_credit(own);
 }

@@ -88,12 +88,12 @@ class LoadAwareEstimator {
   [[nodiscard]] double apart_ns() const noexcept;
   [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
-  [[nodiscard]] bool overruled() const noexcept;
   [[nodiscard]] bool agree() const noexcept;
   [[nodiscard]] bool impossible() const noexcept;
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   [[nodiscard]] bool start_floor(double wait) noexcept;
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
+  [[nodiscard]] double predicted_better() const noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
   [[nodiscard]] double lead() const noexcept { return std::max(lead_, recent_lead_); }
@@ -105,12 +105,8 @@ class LoadAwareEstimator {
   double recent_lead_ = 0.0;  ///< by its short one
   /// q: a density that has learnt nothing yet says little.
   PerDirection<double> learnt_part_{kNowAndThen, kNowAndThen};
-  /// Halves of messages that the first picture explains, not the second.
-  float explained_alone_ = 0.0F;
+  double contest_ = 0.0;   ///< nats by which the first picture leads while the two contradict
   std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
-  /// Messages for which the first picture has just resumed: two that agree by luck make it sharp.
-  std::uint8_t resumed_ = 0;
-  bool off_ = false;  ///< the first picture did not explain the last one that was compared
   bool believed_ = false;
 };
 
