@@ -81,6 +81,8 @@ class FloorEstimator {
   /// been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
+  /// ln of the density p above that the last message had, 1/ns.
+  [[nodiscard]] double log_density() const noexcept { return said_; }
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
   [[nodiscard]] const Estimate& estimate() const noexcept { return mixed_; }
   [[nodiscard]] double scale() const noexcept { return scale_; }

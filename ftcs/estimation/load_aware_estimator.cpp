@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/quick_math.h"
@@ -59,28 +58,20 @@ bool LoadAwareEstimator<Grid>::impossible() const noexcept {
          early * early > kFiveSigma2 * sigma * sigma;
 }
 
-/// By how many nats the first picture predicts the last message better than the floor and its
-/// waits do. What is no density, or one of nothing, says no more than one message may.
-template <class Grid>
-double LoadAwareEstimator<Grid>::predicted_better() const noexcept {
-  const FloorEstimator::Testimony& said = floor_.testimony();
-  const double density = said.share * said.at_floor + (1.0 - said.share) * said.waiting;
-  const double gain =
-      plain_.log_density() - quick_log(std::max(density, std::numeric_limits<double>::min()));
-  return std::clamp(gain, -kConvincing, kConvincing);
-}
-
 /// While the two contradict each other a contest is held: each predicts every message before it is
-/// heard, S = max(0, S + ln p / (w N + (1 - w) T)), nats (a cumulative sum, Page, Biometrika 41,
-/// 1954). A picture that is sharp by luck does not stay ahead; one that is right gains ten nats a
-/// message, since waits are predicted badly.
+/// heard, S = max(0, S + ln p1 - ln p2), nats, p1 and p2 the densities that it had by the first and
+/// by the floor and its waits (a cumulative sum, Page, Biometrika 41, 1954). A picture that is
+/// sharp by luck does not stay ahead; one that is right gains ten nats a message, since waits are
+/// predicted badly.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
   const double noise = plain_noise_ns();
   const bool finer = kMuch * noise < floor_.scale();
   const bool vague = noise > kMuch * floor_.scale();
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart_ns();
-  contest_ = contradicts ? std::max(0.0, contest_ + predicted_better()) : 0.0;
+  const double better = plain_.log_density() - floor_.log_density();
+  const double gain = std::clamp(better, -kConvincing, kConvincing);
+  contest_ = contradicts ? std::max(0.0, contest_ + gain) : 0.0;
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
   // did not wait; where the clock has jumped the floor finds that sooner than a vague picture

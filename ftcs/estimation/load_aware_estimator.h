@@ -93,7 +93,6 @@ class LoadAwareEstimator {
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   [[nodiscard]] bool start_floor(double wait) noexcept;
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
-  [[nodiscard]] double predicted_better() const noexcept;
   void compare(double credit, double own) noexcept;
   void follow_lead(Direction direction) noexcept;
   [[nodiscard]] double lead() const noexcept { return std::max(lead_, recent_lead_); }
