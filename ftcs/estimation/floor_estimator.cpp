@@ -203,12 +203,15 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
 }
 
 bool FloorEstimator::proven() const noexcept {
-  const double members = std::min(paths_.forward.members, paths_.backward.members);
-  return members > kProven;
+  return found_ && std::min(paths_.forward.members, paths_.backward.members) > kProven;
 }
 
 bool FloorEstimator::surmised() const noexcept {
   return std::min(paths_.forward.heard, paths_.backward.heard) < kSurmised;
+}
+
+bool FloorEstimator::recent() const noexcept {
+  return std::min(paths_.forward.heard, paths_.backward.heard) < kOutlierMemory;
 }
 
 bool FloorEstimator::lost() const noexcept {

@@ -69,11 +69,13 @@ class FloorEstimator {
   /// Messages wait, as others see it.
   void wake() noexcept { search_.wake(); }
 
-  /// Messages of both directions have been seen there since.
+  /// It was found, and messages of both directions have been seen there since.
   [[nodiscard]] bool proven() const noexcept;
   /// Too few messages have been heard since it was begun to tell waits from a path that has
   /// changed.
   [[nodiscard]] bool surmised() const noexcept;
+  /// Or to tell it from one that is seen for good.
+  [[nodiscard]] bool recent() const noexcept;
   /// None has been for so long that it is no chance, by so many nats.
   [[nodiscard]] bool dry(double nats) const noexcept;
   /// Dry, and waits alone do not explain it: a message was early, and not by next to nothing beside

@@ -34,7 +34,7 @@ template <class Grid>
 void LoadAwareEstimator<Grid>::forget_floor() noexcept {
   floor_.restart();
   lead_ = recent_lead_ = 0.0;
-  believed_ = false;
+  believed_ = together_ = false;
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -62,27 +62,55 @@ bool LoadAwareEstimator<Grid>::impossible() const noexcept {
 /// heard, S = max(0, S + ln p1 - ln p2), nats, p1 and p2 the densities that it had by the first and
 /// by the floor and its waits (a cumulative sum, Page, Biometrika 41, 1954). A picture that is
 /// sharp by luck does not stay ahead; one that is right gains ten nats a message, since waits are
-/// predicted badly.
+/// predicted badly. `anew`: the first one has just begun again from a line through the last
+/// messages, which it explains; a hint.
 template <class Grid>
-void LoadAwareEstimator<Grid>::compare(double credit, double own) noexcept {
+void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noexcept {
   const double noise = plain_noise_ns();
   const bool finer = kMuch * noise < floor_.scale();
   const bool vague = noise > kMuch * floor_.scale();
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart_ns();
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
-  contest_ = contradicts ? std::max(0.0, contest_ + gain) : 0.0;
+  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
+  // An early message did not wait. A vague picture may lead while the floor finds by how much the
+  // clock has jumped, which that does better; a sharp one ends it.
+  const bool early = own < 0.5 && !floor_.testimony().late;
+  if (early && vague && contest_ > kCertain) doubt_floor();
   // What the first picture explains alone and is late for the floor may have waited, for a whole
-  // frame, or fragment, at a time: no end of a floor that is seen as often as before. An early one
-  // did not wait; where the clock has jumped the floor finds that sooner than a vague picture
-  // does. Noise far smaller than the floor's is none of a floor. One that is not believed yet does
-  // no harm.
-  const bool early = own < 0.5 && !floor_.testimony().late && !vague;
-  const bool dry = floor_.dry(kConvincing);
+  // frame, or fragment, at a time: no end of a floor that is seen as often as before. Noise far
+  // smaller than the floor's is none of a floor. One that is not believed yet does no harm.
   const bool young = !floor_.proven() || floor_.surmised();
-  const double enough = young && dry ? kConvincing : kCertain;
-  const bool disproven = early || finer || dry || (believed_ && young);
-  if (contest_ > enough && (credit > 0.5 || early) && disproven) floor_.unlock();
+  const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : kCertain;
+  const bool unseen = floor_.dry(floor_.recent() ? kHint : kConvincing);
+  const bool ended = early && !vague;
+  const bool disproven = ended || finer || unseen || (believed_ && young);
+  if (contest_ > enough && (credit > 0.5 || ended) && disproven) floor_.unlock();
+}
+
+/// It answers no more until it has convinced again.
+template <class Grid>
+void LoadAwareEstimator<Grid>::doubt_floor() noexcept {
+  believed_ = false;
+  lead_ = recent_lead_ = kCertain;
+}
+
+/// A floor has been found. One that has far more noise than the first picture is none. One that
+/// contradicts what both believed so far, among messages from before, has to convince first.
+/// True: both say the same.
+template <class Grid>
+bool LoadAwareEstimator<Grid>::welcome() noexcept {
+  contest_ = 0.0;
+  const double much = kMuch * plain_noise_ns();
+  if (much < floor_.scale()) {
+    floor_.unlock();
+    return false;
+  }
+  const bool agreed = agree();
+  if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
+  const bool contradicts = together_ && !agreed && much < apart_ns();
+  if (!believed_ || contradicts) doubt_floor();
+  return agreed;
 }
 
 /// On a path that was settled: a second message of the last few that is late by
@@ -138,10 +166,10 @@ double LoadAwareEstimator<Grid>::believed_credit(double own) const noexcept {
 
 /// The first picture knows nothing any more. A long burst of waits does that
 /// too: a floor that is believed, and not lost, goes on, and the first picture
-/// resumes from it.
+/// resumes from it. What it gives up at once again, time after time, is none.
 template <class Grid>
 double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
-  const bool goes_on = believed_ && !floor_.lost();
+  const bool goes_on = believed_ && !floor_.lost() && ++given_up_ <= kFew;
   const double own = goes_on ? floor_.update(seen, floor_.estimate().y) : 0.0;
   if (!goes_on || !floor_.locked()) {
     forget_floor();
@@ -154,8 +182,10 @@ double LoadAwareEstimator<Grid>::give_up(const Observation& seen) noexcept {
 
 template <class Grid>
 double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
+  const std::uint32_t before = plain_.count();
   const double credit = plain_.update(seen);
   if (plain_.count() == 0) return give_up(seen);
+  given_up_ = 0;
   if (!plain_.two_way() || plain_.known_delay().known()) {
     floor_.record(seen, plain_.estimate().y);
     return credit;
@@ -168,12 +198,9 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   if (finds_lucky(direction_of(seen), credit)) return credit;
   bool agreed = false;
   if (floor_.adopted()) {
-    contest_ = 0.0;
-    agreed = agree();
-    if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
-    if (!believed_) lead_ = recent_lead_ = kCertain;
+    agreed = welcome();
   } else if (followed && floor_.locked()) {
-    compare(credit, own);
+    compare(credit, own, plain_.count() <= before);
     // More that wait would open the gate of the first picture.
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
@@ -182,8 +209,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const bool convinces = believed_ || agreed || lead() > kBelieved;
   believed_ =
       floor_.locked() && lead() >= -kBeyondDoubt && convinces && !lucky_.alike(plain_.spread_ns());
-  if (!believed_) return credit;
-  return believed_credit(own);
+  together_ = believed_ && apart_ns() < plain_noise_ns();
+  return believed_ ? believed_credit(own) : credit;
 }
 
 template <class Grid>

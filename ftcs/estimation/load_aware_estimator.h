@@ -93,7 +93,9 @@ class LoadAwareEstimator {
   [[nodiscard]] bool begins_to_wait(double credit) noexcept;
   [[nodiscard]] bool start_floor(double wait) noexcept;
   [[nodiscard]] bool finds_lucky(Direction direction, double credit) noexcept;
-  void compare(double credit, double own) noexcept;
+  void compare(double credit, double own, bool anew) noexcept;
+  void doubt_floor() noexcept;
+  [[nodiscard]] bool welcome() noexcept;
   void follow_lead(Direction direction) noexcept;
   [[nodiscard]] double lead() const noexcept { return std::max(lead_, recent_lead_); }
 
@@ -104,9 +106,11 @@ class LoadAwareEstimator {
   double recent_lead_ = 0.0;  ///< by its short one
   /// q: a density that has learnt nothing yet says little.
   PerDirection<double> learnt_part_{kNowAndThen, kNowAndThen};
-  double contest_ = 0.0;   ///< nats by which the first picture leads while the two contradict
-  std::uint8_t late_ = 0;  ///< messages for which a late one is remembered
+  double contest_ = 0.0;       ///< nats by which the first picture leads while the two contradict
+  std::uint8_t late_ = 0;      ///< messages for which a late one is remembered
+  std::uint8_t given_up_ = 0;  ///< messages in a row at which the first picture gave up
   bool believed_ = false;
+  bool together_ = false;  ///< the floor is believed, and the first picture said the same
 };
 
 extern template class LoadAwareEstimator<FullGrid>;

@@ -130,7 +130,7 @@ TEST(LoadedPath, what_changes_under_load_is_followed) {
     }
     return spec;
   };
-  const std::array<Change, 10> rows = {{
+  const std::array<Change, 12> rows = {{
       {"load 0 to 60 %", load([](double t) { return t < 300.0 ? 0.0 : 0.6; }), 0.0, 100},
       {"load 20 / 80 %, square",
        load([](double t) { return std::fmod(t, 150.0) < 75.0 ? 0.2 : 0.8; }), 0.0, 100},
@@ -148,6 +148,10 @@ TEST(LoadedPath, what_changes_under_load_is_followed) {
        with(loaded(0.7, 0.7), [](S& s) { s.reference_step_ns = 1e6; }), 4.0, 100},
       {"reference steps by -0.1 ms, 70 %",
        with(loaded(0.7, 0.7), [](S& s) { s.reference_step_ns = -1e5; }), 4.0, 100},
+      {"reference steps by 50 ms, 80 %",
+       with(loaded(0.8, 0.8), [](S& s) { s.reference_step_ns = 50e6; }), 2.0, 1e5},
+      {"reference steps by 2 s, 3 hops, 60 %",
+       with(loaded(0.6, 0.6, 3), [](S& s) { s.reference_step_ns = 2e9; }), 2.0, 4e5},
       {"rate steps by 1 ppm, 40 %", with(loaded(0.4, 0.4), [](S& s) { s.rate_step = 1e-6; }), 0.0,
        1000},
   }};
