@@ -6,7 +6,6 @@
 #include "ftcs/estimation/belief.h"
 
 namespace ftcs::estimation {
-
 /// No queue makes packets early, so that two messages, one of each direction,
 /// tell a jump of the offset from anything else. A longer path looks like two
 /// late packets, which are common; so does a jump of the offset where one
@@ -20,12 +19,15 @@ void JumpHypothesis::start(const JumpMessage& message) noexcept {
   const Estimate& believed = message.believed;
   const double innovation = message.seen.z - believed.x - message.seen.sign * believed.d;
   const double size = std::abs(innovation) / message.scale;
+  // Filters resolve no larger variance: then it has jumped by what is seen, give or take so much.
+  const bool far = jumped_ == Of::kOffset && size * size > kUnknown;
   Estimate jumped = believed;
-  (jumped_ == Of::kOffset ? jumped.xx : jumped.dd) += size * size;
+  if (far) jumped.x += innovation;
+  (jumped_ == Of::kOffset ? jumped.xx : jumped.dd) += far ? kUnknown : size * size;
   filter_.start(jumped);
   lead_ = -kHint;  // ln of the probability that a message brings one
   two_way_ = message.two_way;
-  alive_ = size * size < ModelBank<OneModel>::kLargestVariance;
+  alive_ = far || size * size < ModelBank<OneModel>::kLargestVariance;
 }
 
 /// The oscillator wanders as the filters believe that it does.

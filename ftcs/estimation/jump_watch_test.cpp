@@ -63,6 +63,16 @@ TEST(JumpWatch, finds_a_jump_of_the_offset_with_one_message_of_each_direction) {
   EXPECT_NEAR(jumped.d, kPath, 10.0);
 }
 
+TEST(JumpWatch, finds_a_jump_of_any_size) {
+  for (const double jump : {1e6, 1e7, 5e7, 2e9, -37e9}) {
+    Calm calm;
+    EXPECT_NE(calm.forward(0.7, kPath + jump), Verdict::kJumped);
+    EXPECT_EQ(calm.backward(0.3, -kPath + jump - 60.0), Verdict::kJumped) << jump;
+    EXPECT_NEAR(calm.watch().estimate().x, jump, 100.0);
+    EXPECT_NEAR(calm.watch().estimate().d, kPath, 10.0);
+  }
+}
+
 TEST(JumpWatch, needs_both_directions) {
   Calm calm;
   for (int i = 0; i < 4; ++i) EXPECT_NE(calm.forward(1.0, kPath - 20'000.0), Verdict::kJumped) << i;

@@ -130,6 +130,7 @@ TEST(LoadedPath, what_changes_under_load_is_followed) {
     }
     return spec;
   };
+  // A step times the skew of 50 ppm is no error: it is when the event was.
   const std::array<Change, 12> rows = {{
       {"load 0 to 60 %", load([](double t) { return t < 300.0 ? 0.0 : 0.6; }), 0.0, 100},
       {"load 20 / 80 %, square",
@@ -149,7 +150,7 @@ TEST(LoadedPath, what_changes_under_load_is_followed) {
       {"reference steps by -0.1 ms, 70 %",
        with(loaded(0.7, 0.7), [](S& s) { s.reference_step_ns = -1e5; }), 4.0, 100},
       {"reference steps by 50 ms, 80 %",
-       with(loaded(0.8, 0.8), [](S& s) { s.reference_step_ns = 50e6; }), 2.0, 1e5},
+       with(loaded(0.8, 0.8), [](S& s) { s.reference_step_ns = 50e6; }), 2.0, 3000},
       {"reference steps by 2 s, 3 hops, 60 %",
        with(loaded(0.6, 0.6, 3), [](S& s) { s.reference_step_ns = 2e9; }), 2.0, 4e5},
       {"rate steps by 1 ppm, 40 %", with(loaded(0.4, 0.4), [](S& s) { s.rate_step = 1e-6; }), 0.0,
