@@ -83,6 +83,10 @@ class FloorEstimator {
   /// been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
+  /// That a clock has jumped explains best what is seen, but is not certain.
+  [[nodiscard]] bool seeks_jump() const noexcept {
+    return jumps_.judge(kConvincing) == JumpWatch::Verdict::kWait;
+  }
   /// ln of the density p above that the last message had, 1/ns.
   [[nodiscard]] double log_density() const noexcept { return said_; }
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }
