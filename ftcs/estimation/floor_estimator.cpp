@@ -206,13 +206,13 @@ bool FloorEstimator::proven() const noexcept {
   return found_ && std::min(paths_.forward.members, paths_.backward.members) > kProven;
 }
 
-bool FloorEstimator::surmised() const noexcept {
-  return std::min(paths_.forward.heard, paths_.backward.heard) < kSurmised;
+double FloorEstimator::heard() const noexcept {
+  return std::min(paths_.forward.heard, paths_.backward.heard);
 }
 
-bool FloorEstimator::recent() const noexcept {
-  return std::min(paths_.forward.heard, paths_.backward.heard) < kOutlierMemory;
-}
+bool FloorEstimator::surmised() const noexcept { return heard() < kSurmised; }
+
+bool FloorEstimator::recent() const noexcept { return heard() < kOutlierMemory; }
 
 bool FloorEstimator::lost() const noexcept {
   const auto speaks = [](const Path& path) { return path.dry > 0.0 || path.there; };

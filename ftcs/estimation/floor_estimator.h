@@ -121,6 +121,8 @@ class FloorEstimator {
     WaitDensity waits{};
   };
 
+  /// Messages since it was begun, of the direction that has fewer.
+  [[nodiscard]] double heard() const noexcept;
   double follow(const Observation& seen) noexcept;
   [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;

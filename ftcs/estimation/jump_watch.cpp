@@ -6,6 +6,7 @@
 #include "ftcs/estimation/belief.h"
 
 namespace ftcs::estimation {
+
 /// No queue makes packets early, so that two messages, one of each direction,
 /// tell a jump of the offset from anything else. A longer path looks like two
 /// late packets, which are common; so does a jump of the offset where one

@@ -27,10 +27,10 @@ struct JumpMessage {
 /// One hypothesis: offset or path delay has jumped between the last message
 /// that fitted and the first that did not. It starts from what was believed,
 /// with the variance nu^2 of that first message added to what has jumped (an
-/// offset beyond 100,000 sigma: moved by nu), and goes on as a filter of its own; `lead` is what
-/// speaks for it, the logarithm of a likelihood ratio with the prior in it. Where messages wait
-/// usually it begins anew from one that is early by eight sigma under it: the first may have
-/// waited.
+/// offset beyond 100,000 sigma: moved by nu), and goes on as a filter of its
+/// own; `lead` is what speaks for it, the logarithm of a likelihood ratio with
+/// the prior in it. Where messages wait usually it begins anew from one that is
+/// early by eight sigma under it: the first may have waited.
 class JumpHypothesis {
  public:
   enum class Of : std::uint8_t { kOffset, kDelay };

@@ -34,7 +34,7 @@ template <class Grid>
 void LoadAwareEstimator<Grid>::forget_floor() noexcept {
   floor_.restart();
   lead_ = recent_lead_ = 0.0;
-  believed_ = together_ = false;
+  believed_ = false;
 }
 
 /// Both say the same of the offset, and the first picture, which has heard
@@ -69,7 +69,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const double noise = plain_noise_ns();
   const bool finer = kMuch * noise < floor_.scale();
   const bool vague = noise > kMuch * floor_.scale();
-  const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart_ns();
+  const double apart = apart_ns();
+  together_ = apart < noise;
+  const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart;
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
   contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
@@ -103,15 +105,18 @@ void LoadAwareEstimator<Grid>::doubt_floor() noexcept {
 template <class Grid>
 bool LoadAwareEstimator<Grid>::welcome() noexcept {
   contest_ = 0.0;
-  const double much = kMuch * plain_noise_ns();
+  const double noise = plain_noise_ns();
+  const double much = kMuch * noise;
   if (much < floor_.scale()) {
     floor_.unlock();
     return false;
   }
   const bool agreed = agree();
   if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
-  const bool contradicts = together_ && !agreed && much < apart_ns();
+  const double apart = apart_ns();
+  const bool contradicts = together_ && !agreed && much < apart;
   if (!believed_ || contradicts) doubt_floor();
+  together_ = apart < noise;
   return agreed;
 }
 
@@ -139,6 +144,7 @@ bool LoadAwareEstimator<Grid>::start_floor(double wait) noexcept {
   floor_.start_from(plain_.bank(), plain_.evidence(), plain_.scale(), noise, wait);
   lead_ = recent_lead_ = 0.0;
   contest_ = 0.0;
+  together_ = false;
   believed_ = true;
   return true;
 }
@@ -211,7 +217,6 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   const bool convinces = believed_ || agreed || lead() > kBelieved;
   believed_ =
       floor_.locked() && lead() >= -kBeyondDoubt && convinces && !lucky_.alike(plain_.spread_ns());
-  together_ = believed_ && apart_ns() < plain_noise_ns();
   return believed_ ? believed_credit(own) : credit;
 }
 

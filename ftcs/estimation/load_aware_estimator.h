@@ -110,7 +110,7 @@ class LoadAwareEstimator {
   std::uint8_t late_ = 0;      ///< messages for which a late one is remembered
   std::uint8_t given_up_ = 0;  ///< messages in a row at which the first picture gave up
   bool believed_ = false;
-  bool together_ = false;  ///< the floor is believed, and the first picture said the same
+  bool together_ = false;  ///< both pictures said the same at the last message
 };
 
 extern template class LoadAwareEstimator<FullGrid>;
