@@ -189,11 +189,22 @@ short=$(peak_kib short.toml)
 long=$(peak_kib long-run.toml)
 [ $((long - short)) -lt 2048 ] || fail "memory grows with the run: $short KiB for 1,000 cycles, $long KiB for 100,000"
 
+# Waits until the program $1 has computed for half a second or has ended: on a busy machine a second can pass before
+# it computes at all.
+computed() {
+  local ticks
+  for _ in $(seq 600); do
+    ticks=$(awk '{ print $14 + $15 }' "/proc/$1/stat" 2> /dev/null) || return
+    [ "${ticks:-0}" -ge 50 ] && return
+    sleep 0.1
+  done
+}
+
 # An interrupted sweep writes what it has.
 sed 's/seeds = 5/seeds = 100000/' good.toml > long.toml
 "$ftcs" simulate long.toml -q --json interrupted.json 2> err &
 program=$!
-sleep 1
+computed $program
 kill -INT $program
 wait $program
 [ $? -eq 1 ] || fail "an interrupted sweep must not succeed"
@@ -206,7 +217,7 @@ cat good.toml limit > done.toml
 cat long.toml limit > cut.toml
 "$ftcs" simulate done.toml cut.toml cut.toml good.toml > out 2> err &
 program=$!
-sleep 1
+computed $program
 kill -INT $program
 wait $program
 [ $? -eq 1 ] || fail "an interrupted suite must not succeed"
@@ -216,7 +227,7 @@ grep -q 'interrupted; .*; of 4 scenarios, cut short: 1, not run: 2; these are no
 
 "$ftcs" paper -q --seeds 100000 --json interrupted-paper.json > out 2> err &
 program=$!
-sleep 1
+computed $program
 kill -INT $program
 wait $program
 [ $? -eq 1 ] || fail "an interrupted paper must not succeed"
