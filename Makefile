@@ -13,8 +13,8 @@
 
 CMAKE_FLAGS ?=
 JOBS ?= $(shell nproc 2>/dev/null || echo 2)
-# Those that wait for a network are many: one more at a time than there are processors.
-TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
+# Those that wait for a network stand in two rows: two more at a time than there are processors.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 DEMO_FLAGS ?=
 FUZZ_SECONDS ?= 60
 JOB ?=

@@ -18,13 +18,21 @@ start_ptp4l receiver "slaveOnly 1" "logSyncInterval -2" "freq_est_interval 0" "s
   "${theirs_too[@]}"
 start_capture
 
-clocks() { python3 -c 'import time; print(time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW), time.clock_gettime_ns(time.CLOCK_REALTIME))'; }
-before=$(clocks)
+# The kernel's own correction of CLOCK_REALTIME, ptp4l's clock, against ours, four times a second: seconds and nanoseconds.
+python3 -c '
+import time
+base = time.time_ns() - time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW)
+while True:
+    raw, real = time.clock_gettime_ns(time.CLOCK_MONOTONIC_RAW), time.clock_gettime_ns(time.CLOCK_REALTIME)
+    print(f"{raw / 1e9:.9f} {real - raw - base}", flush=True)
+    time.sleep(0.25)' > "$folder/clocks" &
+clocks=$!
+pids+=("$clocks")
 code=0
 ip netns exec "$ours" "$ftcs" ptp -i "$our_interface" --role time-transmitter --skew ${skew_ppb}ppb \
   --time_stamping software --tx_timestamp_timeout 50 --logMinDelayReqInterval -2 "${ours_too[@]}" \
   --logSyncInterval -2 --duration "$duration" > "$folder/transmitter.log" 2> "$folder/errors.log" || code=$?
-after=$(clocks)
+kill "$clocks"
 cat "$folder/transmitter.log"
 [ "$code" -eq 0 ] || fail "exit code $code"
 [ -s "$folder/errors.log" ] && fail "error lines"
@@ -34,16 +42,18 @@ grep -qE "FAULT|timed out|bad message|ignoring" "$folder/receiver.log" && fail "
 samples=$(grep -c "master offset" "$folder/receiver.log" || true)
 [ "$samples" -ge $(((duration - 6) * 8 / 10)) ] || fail "ptp4l printed only $samples offsets in $duration s"
 
-# The median slope between two offsets: a delayed packet cannot tilt it. ptp4l's clock is CLOCK_REALTIME and ours
-# CLOCK_MONOTONIC_RAW plus the skew, so that the kernel's own correction of REALTIME, measured meanwhile, counts too.
-sed -n 's/^ptp4l\[\([0-9.]*\)\]: master offset *\(-\{0,1\}[0-9]*\) .*/\1 \2/p' "$folder/receiver.log" \
-  | awk '{ for (i = 0; i < NR - 1; i++) if ($1 > x[i]) printf "%.3f\n", ($2 - y[i]) / ($1 - x[i])
-           x[NR - 1] = $1; y[NR - 1] = $2 }' | sort -g > "$folder/slopes"
-slope=$(sed -n "$(($(wc -l < "$folder/slopes") / 2 + 1))p" "$folder/slopes")
-echo "$before $after $slope" | awk -v skew=$skew_ppb -v samples="$samples" '{
-    expected = (($4 - $2) - ($3 - $1)) / ($3 - $1) * 1e9 - skew
-    printf "%d offsets; slope %.0f ppb, expected %.0f ppb\n", samples, $5, expected
+# The median slope between two points: neither a delayed packet nor a step of CLOCK_REALTIME tilts it.
+median_slope() {
+  awk '{ for (i = 0; i < NR - 1; i++) if ($1 > x[i]) printf "%.3f\n", ($2 - y[i]) / ($1 - x[i])
+         x[NR - 1] = $1; y[NR - 1] = $2 }' | sort -g > "$folder/slopes"
+  sed -n "$(($(wc -l < "$folder/slopes") / 2 + 1))p" "$folder/slopes"
+}
+slope=$(sed -n 's/^ptp4l\[\([0-9.]*\)\]: master offset *\(-\{0,1\}[0-9]*\) .*/\1 \2/p' "$folder/receiver.log" | median_slope)
+correction=$(median_slope < "$folder/clocks")
+awk -v slope="$slope" -v correction="$correction" -v skew=$skew_ppb -v samples="$samples" 'BEGIN {
+    expected = correction - skew
+    printf "%d offsets; slope %.0f ppb, expected %.0f ppb\n", samples, slope, expected
     tolerance = 2000  # offsets scatter by microseconds over seconds
-    exit !($5 - expected < tolerance && expected - $5 < tolerance)
+    exit !(slope - expected < tolerance && expected - slope < tolerance)
   }' || fail "ptp4l sees another rate than our clock has"
 check_capture
