@@ -74,6 +74,8 @@ class FloorEstimator {
   /// Too few messages have been heard since it was begun to tell waits from a path that has
   /// changed.
   [[nodiscard]] bool surmised() const noexcept;
+  /// It was begun, from what was believed without it, and is surmised.
+  [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
   /// Or to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
   /// None has been for so long that it is no chance, by so many nats.

@@ -79,6 +79,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // clock has jumped, which that does better; a sharp one ends it.
   const bool early = own < 0.5 && !floor_.testimony().late;
   if (early && vague && contest_ > kCertain) doubt_floor();
+  // One that was begun since a direction came late, and a message of the other is early: the clock
+  // has changed.
+  if (early && floor_.just_begun()) floor_.unlock();
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. Noise far
   // smaller than the floor's is none of a floor. One that is not believed does no harm; if it looks
