@@ -212,6 +212,10 @@ double FloorEstimator::heard() const noexcept {
 
 bool FloorEstimator::surmised() const noexcept { return heard() < kSurmised; }
 
+bool FloorEstimator::never_seen() const noexcept {
+  return found_ && !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;
+}
+
 bool FloorEstimator::recent() const noexcept { return heard() < kOutlierMemory; }
 
 bool FloorEstimator::lost() const noexcept {

@@ -69,13 +69,17 @@ class FloorEstimator {
   /// Messages wait, as others see it.
   void wake() noexcept { search_.wake(); }
 
+  /// By the search, and not begun from what was believed without it.
+  [[nodiscard]] bool found() const noexcept { return found_; }
   /// It was found, and messages of both directions have been seen there since.
   [[nodiscard]] bool proven() const noexcept;
   /// Too few messages have been heard since it was begun to tell waits from a path that has
   /// changed.
   [[nodiscard]] bool surmised() const noexcept;
-  /// It was begun, from what was believed without it, and is surmised.
   [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
+  /// It was found, and no message has been seen there since, of either direction; by 14 nats of
+  /// each.
+  [[nodiscard]] bool never_seen() const noexcept;
   /// Or to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
   /// None has been for so long that it is no chance, by so many nats.

@@ -24,10 +24,12 @@ double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
   return std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
 }
 
-/// By how much the two differ in the offset.
+/// By how much the two differ in the offset, so many cycles from now.
 template <class Grid>
-double LoadAwareEstimator<Grid>::apart_ns() const noexcept {
-  return std::abs(floor_.estimate().x - plain_.estimate().x);
+double LoadAwareEstimator<Grid>::apart_ns(double ahead) const noexcept {
+  const Estimate& floor = floor_.estimate();
+  const Estimate& plain = plain_.estimate();
+  return std::abs(floor.x - plain.x + ahead * (floor.y - plain.y));
 }
 
 template <class Grid>
@@ -71,7 +73,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool vague = noise > kMuch * floor_.scale();
   const double apart = apart_ns();
   together_ = apart < noise;
-  const bool contradicts = finer || (vague ? kMuch * noise : noise) < apart;
+  // Lines that are about to part do. (One that was begun is where the first picture was.)
+  const double soon = floor_.found() ? std::max(apart, apart_ns(kFew)) : apart;
+  const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
   contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
@@ -82,6 +86,7 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // One that was begun since a direction came late, and a message of the other is early: the clock
   // has changed.
   if (early && floor_.just_begun()) floor_.unlock();
+  if (floor_.never_seen() && contest_ > 0.0) floor_.unlock();
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before. Noise far
   // smaller than the floor's is none of a floor. One that is not believed does no harm; if it looks
