@@ -76,12 +76,12 @@ class FloorEstimator {
   /// Too few messages have been heard since it was begun to tell waits from a path that has
   /// changed.
   [[nodiscard]] bool surmised() const noexcept;
-  [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
-  /// It was found, and no message has been seen there since, of either direction; by 14 nats of
-  /// each.
-  [[nodiscard]] bool never_seen() const noexcept;
   /// Or to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
+  /// Begun, not found, and surmised.
+  [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
+  /// It was found, and no message of either direction has been seen there since: 14 nats each.
+  [[nodiscard]] bool never_seen() const noexcept;
   /// None has been for so long that it is no chance, by so many nats.
   [[nodiscard]] bool dry(double nats) const noexcept;
   /// Dry, and waits alone do not explain it: a message was early, and not by next to nothing beside
