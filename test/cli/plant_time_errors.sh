@@ -82,6 +82,6 @@ if [ "$(id -u)" -eq 0 ] && command -v ip > /dev/null && ip netns add "ftcs-pe$$"
   kill "$stranger"
   "${inside[@]}" "$here/../doctor/transmitter.py" gm flags=0 ahead=-1700000000 > "$folder/transmitter.log" 2>&1 &
   pids+=($!)
-  refused 3 "an arbitrary epoch is no plant time" --plant-time ptp:pt --bus-mode external --await-lock 7
+  refused 3 "an arbitrary epoch is no plant time" --plant-time ptp:pt --bus-mode external --await-lock 20
 fi
 echo "ok"
