@@ -49,14 +49,13 @@ Advice advice(Cause cause) noexcept {
   return found == kAdvice.end() ? Advice{cause, "", ""} : *found;
 }
 
-/// A margin of less than this share of the cycle, on either side of SYNC0, is within reach of
-/// jitter.
-constexpr double kNarrowShare = 0.05;
-
 /// The frame came just too late for its SYNC0: the next one, that the margin is of, is a cycle
 /// away.
-bool is_after_sync0(const CycleSeen& seen) noexcept {
-  return seen.margin_ns > (1.0 - kNarrowShare) * seen.cycle_ns;
+bool is_after_sync0(const CycleSeen& seen) noexcept { return seen.margin_ns > seen.cycle_ns / 2; }
+
+/// Between the frame and the SYNC0 that it is nearer to.
+double distance_ns(const CycleSeen& seen) noexcept {
+  return is_after_sync0(seen) ? seen.cycle_ns - seen.margin_ns : seen.margin_ns;
 }
 
 /// Writes what was seen, up to the room there is.
@@ -79,12 +78,10 @@ std::size_t write_seen(std::span<char> text, Cause cause, const CycleSeen& seen)
     case Cause::kHostLate:
       return write(FMT_STRING("{} of the last {} cycles began more than {:.0f} us late"), seen.late,
                    seen.cycles, seen.gate_ns * 1e-3);
-    case Cause::kMarginTooSmall: {
-      const bool after = is_after_sync0(seen);
+    case Cause::kMarginTooSmall:
       return write(FMT_STRING("frames arrive {:.1f} us {} SYNC0, cycle {:.0f} us"),
-                   (after ? seen.cycle_ns - seen.margin_ns : seen.margin_ns) * 1e-3,
-                   after ? "after" : "before", seen.cycle_ns * 1e-3);
-    }
+                   distance_ns(seen) * 1e-3, is_after_sync0(seen) ? "after" : "before",
+                   seen.cycle_ns * 1e-3);
     case Cause::kDrivesNotOperational:
       return write(FMT_STRING("a drive is not in OP, working counter {} of {}"),
                    seen.working_counter, seen.expected_counter);
@@ -120,8 +117,8 @@ Cause cause_of_failure(const CycleSeen& seen) noexcept {
 
 /// Whether the frame comes so near to SYNC0 that jitter decides which SYNC0 it is in time for.
 bool is_narrow(const CycleSeen& seen) noexcept {
-  return !std::isnan(seen.margin_ns) &&
-         (seen.margin_ns < kNarrowShare * seen.cycle_ns || is_after_sync0(seen));
+  constexpr double kShare = 0.05;
+  return !std::isnan(seen.margin_ns) && distance_ns(seen) < kShare * seen.cycle_ns;
 }
 
 /// More than one in ten is no accident.
