@@ -166,6 +166,8 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   // was early showed as much.
   const bool waits = !early && in.credit[best_] < kUnlikely;
   if (waits && early_ == 0) return;
+  double sharp = kSharp * mean_wait_;
+  if (early_ > 0) sharp = std::min(sharp, static_cast<double>(early_by_));
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
@@ -173,8 +175,9 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
             .source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
     if (waits && !shows_in_early(bank_.estimate(source))) continue;
-    // A model so wild that it takes waits for the floor knows nothing better.
-    if (scale_ * std::sqrt(bank_.estimate(source).xx) > kSharp * mean_wait_) continue;
+    // A model so wild that it takes waits for the floor, or does not believe the message that was
+    // early, knows nothing better.
+    if (scale_ * std::sqrt(bank_.estimate(source).xx) > sharp) continue;
     bank_.set(i, bank_.estimate(source));
   }
 }

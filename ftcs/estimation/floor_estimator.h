@@ -89,6 +89,8 @@ class FloorEstimator {
   /// been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
+  /// One of the last few messages was early: it may be finding a change of the clock.
+  [[nodiscard]] bool early_lately() const noexcept { return early_ > 0; }
   /// That a clock has jumped explains best what is seen, but is not certain.
   [[nodiscard]] bool seeks_jump() const noexcept {
     return jumps_.judge(kConvincing) == JumpWatch::Verdict::kWait;

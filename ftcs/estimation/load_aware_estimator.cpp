@@ -73,8 +73,10 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool vague = noise > kMuch * floor_.scale();
   const double apart = apart_ns();
   together_ = apart < noise;
-  // Lines that are about to part do. (One that was begun is where the first picture was.)
-  const double soon = floor_.found() ? std::max(apart, apart_ns(kFew)) : apart;
+  // Lines that are about to part do. (One that was begun is where the first picture was; one that
+  // is finding a change of the clock is heard first.)
+  const double soon =
+      floor_.found() && !floor_.early_lately() ? std::max(apart, apart_ns(kFew)) : apart;
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
