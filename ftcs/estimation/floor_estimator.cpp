@@ -7,25 +7,11 @@
 
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/delay_shape.h"
-#include "ftcs/estimation/elementary.h"
 #include "ftcs/estimation/lanes.h"
 #include "ftcs/estimation/quick_math.h"
 
 namespace ftcs::estimation {
 namespace {
-
-/// Messages at a floor that was found, those of the fit (all but two of them at
-/// most) included.
-constexpr double kProven = 12.0;
-/// Messages of each direction that a new floor must have heard: until then what is taken for waits
-/// may be a path that has changed.
-constexpr double kSurmised = kProven - 2.0;
-/// Start of the filters that hear the members of a fit once more, in units of
-/// its noise.
-constexpr double kWide = 1e4;
-/// The noise of a line contains what the oscillator did; the filters tell the
-/// two apart.
-constexpr double kMostPart = 2.0;
 
 double log_normal(double distance, double log_variance) noexcept {
   return -0.5 * (distance + log_variance + kLn2Pi);
@@ -35,6 +21,7 @@ double log_normal(double distance, double log_variance) noexcept {
 
 void FloorEstimator::restart() noexcept {
   locked_ = adopted_ = false;
+  for (const Direction each : kDirections) paths_[each].early = 0.0F;
   search_.restart();
 }
 
@@ -94,13 +81,14 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
                                                         const Path& path) const noexcept {
   using V = Bank::V;
   const DelayShape noise{path.variance / (scale_ * scale_), 0.0};
+  const double early = std::max(kHardlyEver, static_cast<double>(path.early));
   Bank::Innovations in = bank_.judge(seen, noise, scale_, {}, false);
   for (std::size_t i = 0; i < FloorGrid::kSize; i += Bank::kStep) {
     V other;
     for (std::size_t lane = 0; lane < Bank::kStep; ++lane) {
       const double nu = in.centred[i + lane];
       other[lane] = nu > 0.0 ? (1.0 - path.share) * path.waits.at(nu)
-                             : kHardlyEver / any_size(nu, std::sqrt(in.variance[i + lane]));
+                             : early / any_size(nu, std::sqrt(in.variance[i + lane]));
     }
     const V log_density = larger<V>(load<V>(&in.log_density[i]), V{} + kLeastExponent);
     const V normal = path.share * quick_exp(log_density);
@@ -118,7 +106,8 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
 /// size. What is believed is asked under the same.
 void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                                  const Bank::Innovations& in) noexcept {
-  const OutlierPrior outliers{1.0 - path.share, kHardlyEver};
+  const OutlierPrior outliers{1.0 - path.share,
+                              std::max(kHardlyEver, static_cast<double>(path.early))};
   const DelayShape shape{path.variance / (scale_ * scale_), 0.0};
   const double distance = in.distance[best_];
   double log_density = log_normal(distance, in.log_variance[best_]);
@@ -156,6 +145,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (shows) {
     bank_.start(jumps_.estimate());
+    for (const Direction each : kDirections) paths_[each].early = 0.0F;  // they said so
     detector_.clear();
     jumps_.clear();
     search_.alarm();
@@ -198,11 +188,25 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
     const double square = std::min(nu * nu, kEightSigma * in.variance[best_]) * own;
     path.variance += credit / std::min(path.members, kLongMemory) * (square - path.variance);
   }
+  learn_early(path, nu, credit);
   if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
   path.there = credit >= kUnlikely;
   if (!path.there && path.dry == 0.0) other.there = false;
   path.dry = path.there ? 0.0 : path.dry - quick_log(1.0 - path.share);
   if (path.dry > kSure) search_.alarm();
+}
+
+/// Early by next to nothing beside the waits, and those after it are where they were. What is early
+/// by as much as messages wait says that this is not the floor.
+void FloorEstimator::learn_early(Path& path, double nu, double credit) noexcept {
+  constexpr auto part = static_cast<float>(1.0 / kLoadMemory);
+  path.early -= part * path.early;
+  const bool near = -nu < kSharp * static_cast<double>(path.mean_wait);
+  if (nu < 0.0 && credit < kUnlikely && near) path.pending = true;
+  if (credit > 0.5 && path.pending) {
+    path.early += part;
+    path.pending = false;
+  }
 }
 
 bool FloorEstimator::proven() const noexcept {
@@ -217,6 +221,13 @@ bool FloorEstimator::surmised() const noexcept { return heard() < kSurmised; }
 
 bool FloorEstimator::never_seen() const noexcept {
   return found_ && !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;
+}
+
+bool FloorEstimator::seen_one_way() const noexcept {
+  const auto seen = [](const Path& path) {
+    return path.there && path.recent_share > kNearlyAll * path.share;
+  };
+  return seen(paths_.forward) || seen(paths_.backward);
 }
 
 bool FloorEstimator::recent() const noexcept { return heard() < kOutlierMemory; }
@@ -258,115 +269,6 @@ void FloorEstimator::look() noexcept {
   if (!search_.look(rival(), least_noise_)) return;
   adopt(search_.found());
   search_.adopt();
-}
-
-void FloorEstimator::begin(double scale, double wait) noexcept {
-  scale_ = std::max(scale, least_noise_);
-  mean_wait_ = wait;
-  evidence_.forget();
-  detector_.clear();
-  jumps_.clear();
-  weight_.fill(0.0);
-  best_ = FloorGrid::kStart;
-  weight_[best_] = 1.0;
-  count_ = kLately;
-  early_ = 0;
-  early_by_ = 0.0F;
-  locked_ = adopted_ = true;
-}
-
-void FloorEstimator::begin_path(Path& path, double share, double members) noexcept {
-  path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
-  path.variance = scale_ * scale_;
-  path.members = members;
-  path.heard = path.dry = 0.0;
-  path.there = false;
-  path.waits.start(mean_wait_);
-}
-
-void FloorEstimator::adopt(const FloorFit& fit) noexcept {
-  begin(fit.sigma(), fit.noise.forward.mean_wait);
-  found_ = true;
-  hear_members_again(fit);
-  for (const Direction direction : kDirections) {
-    // The earliest of b messages is at the floor with probability 1 - (1 -
-    // w)^b.
-    const double entries = 1.0 / static_cast<double>(search_.stride());
-    const double share =
-        1.0 - portable_exp(entries * portable_log(1.0 - fit.noise[direction].share));
-    begin_path(paths_[direction], share, std::min(fit.members[direction], kProven - 2.0));
-  }
-  mix();
-}
-
-void FloorEstimator::start_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
-                                double scale, const PerDirection<double>& noise,
-                                double wait) noexcept {
-  begin(scale, wait);
-  found_ = false;
-  for (const Direction direction : kDirections) {
-    begin_path(paths_[direction], kNearlyAll, kLongMemory / 10.0);
-    paths_[direction].variance = noise[direction] * noise[direction];
-  }
-  take_from(bank, evidence, scale);
-}
-
-/// Its level is known by repetition, which is proof enough.
-void FloorEstimator::lower(Direction direction, double ns, double share) noexcept {
-  Path& path = paths_[direction];
-  path.share = path.recent_share = std::clamp(share, kSeldom, 1.0 - kSeldom);
-  found_ = true;
-  for (const Direction each : kDirections) paths_[each].heard = kSurmised;
-  const double sign = sign_of(direction);
-  bank_.for_each([=](Estimate& e) {
-    e.x -= sign * ns / 2.0;
-    e.d -= ns / 2.0;
-  });
-  mix();
-}
-
-/// The line's noise includes what the oscillator did meanwhile. Heard once
-/// more, in order, the messages at the floor tell the two apart.
-void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
-  double last = 0.0;
-  int heard = 0;
-  search_.each_member([&](Direction direction, double time, double z) {
-    if (heard == 0) {
-      Estimate start = fit.estimate;
-      start.x += start.y * time;
-      start.xx = start.dd = start.yy = kWide;
-      start.xy = start.xd = start.yd = 0.0;
-      bank_.start(start);
-      last = time;
-    }
-    (void)bank_.predict(time - last, best_);
-    last = time;
-    const Observation seen{sign_of(direction), 0.0, z};
-    const Bank::Innovations in = bank_.judge(seen, {}, scale_, {}, false);
-    bank_.correct(seen, scale_, in);
-    if (++heard > kFew) evidence_.add(in.distance, in.log_variance, 1.0, scale_);
-  });
-  if (heard == 0) {
-    bank_.start(fit.estimate);
-    return;
-  }
-  (void)bank_.predict(-last, best_);
-  if (!(evidence_.messages() > 0.0)) return;
-  best_ = evidence_.weigh(weight_);
-  const double seen = std::sqrt(evidence_.mean_square(best_));
-  scale_ = std::clamp(seen, least_noise_, kMostPart * scale_);
-}
-
-void FloorEstimator::take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,
-                               double scale) noexcept {
-  evidence_.take_from(evidence, FloorGrid::kInFull);
-  const double units = scale * scale / (scale_ * scale_);
-  for (std::size_t i = 0; i < FloorGrid::kSize; ++i) {
-    Estimate e = bank.estimate(FloorGrid::kInFull[i]);
-    e.rescale_covariance(units);
-    bank_.set(i, e);
-  }
-  choose();
 }
 
 double FloorEstimator::noise_ns(Direction direction) const noexcept {

@@ -89,6 +89,9 @@ class FloorEstimator {
   /// been heard since.
   [[nodiscard]] bool lost() const noexcept;
 
+  /// The last message of a direction was there, and as many of it are as before, whatever the other
+  /// waits.
+  [[nodiscard]] bool seen_one_way() const noexcept;
   /// One of the last few messages was early: it may be finding a change of the clock.
   [[nodiscard]] bool early_lately() const noexcept { return early_ > 0; }
   /// That a clock has jumped explains best what is seen, but is not certain.
@@ -116,6 +119,12 @@ class FloorEstimator {
   using Bank = ModelBank<FloorGrid>;
   using Row = Bank::Row;
 
+  /// Messages at a floor that was found, those of the fit (all but two of them at most) included.
+  static constexpr double kProven = 12.0;
+  /// Messages of each direction that a new floor must have heard: until then what is taken for
+  /// waits may be a path that has changed.
+  static constexpr double kSurmised = kProven - 2.0;
+
   /// What is known of one direction.
   struct Path {
     double share = 0.5;         ///< w
@@ -123,10 +132,13 @@ class FloorEstimator {
     double variance = 1.0;      ///< r^2, ns^2
     double members = 0.0;       ///< messages at the floor behind the variance
     double heard = 0.0;
-    double dry = 0.0;    ///< nats: how unlikely it is that none of the last was at
-                         ///< the floor
-    bool there = false;  ///< the last one was, and since the other direction is dry
+    double dry = 0.0;      ///< nats: how unlikely it is that none of the last was at
+                           ///< the floor
+    bool there = false;    ///< the last one was, and since the other direction is dry
+    bool pending = false;  ///< an early one that later ones have not explained
     WaitDensity waits{};
+    float early = 0.0F;      ///< probability of an early outlier
+    float mean_wait = 0.0F;  ///< ns, when the floor was found
   };
 
   /// Messages since it was begun, of the direction that has fewer.
@@ -137,12 +149,13 @@ class FloorEstimator {
   [[nodiscard]] bool shows_in_early(const Estimate& after) const noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
   void learn(Path& path, Path& other, const Bank::Innovations& in) noexcept;
+  static void learn_early(Path& path, double nu, double credit) noexcept;
   void choose() noexcept;
   void mix() noexcept;
   void look() noexcept;
   void adopt(const FloorFit& fit) noexcept;
   void begin(double scale, double wait) noexcept;
-  void begin_path(Path& path, double share, double members) noexcept;
+  void begin_path(Path& path, double share, double members, double wait) noexcept;
   void hear_members_again(const FloorFit& fit) noexcept;
   [[nodiscard]] FloorSearch::Rival rival() const noexcept;
 

@@ -29,8 +29,15 @@ struct Candidate {
   double rate = 0.0;
   double score = -1e300;
   double width = 0.0;
-  double mean = 0.0;  ///< height above the lines
+  double mean = 0.0;     ///< height above the lines
+  double highest = 0.0;  ///< the same, of the direction in which it is larger
   PerDirection<double> floor{};
+};
+
+/// Of one direction: messages that waited, and for how long in all.
+struct Waits {
+  double messages = 0.0;
+  double ns = 0.0;
 };
 
 class Fit {
@@ -48,9 +55,12 @@ class Fit {
     fit.estimate.y = best_.rate;
     fit.has_rate = true;
     start(fit);
+    PerDirection<Waits> waits;
     for (int round = 0; round < kRounds; ++round) {
-      if (!improve(fit)) return fit;
+      waits = {};
+      if (!improve(fit, waits)) return fit;
     }
+    tell_apart(fit, waits);
     judge(fit);
     fit.estimate.x += base_;
     return fit;
@@ -114,12 +124,15 @@ class Fit {
         least = std::min(least, height(direction, m, rate, window.time(m)));
       }
       candidate.floor[direction] = least;
+      double sum = 0.0;
       for (std::size_t k = 0; k < window.size; ++k) {
         const RecordedMessage& m = window[k];
         const double above = height(direction, m, rate, window.time(m)) - least;
-        candidate.mean += above / total_;
+        sum += above;
         ++count[static_cast<std::size_t>(octave_of(above))];
       }
+      candidate.mean += sum / total_;
+      candidate.highest = std::max(candidate.highest, sum / static_cast<double>(window.size));
     }
     score(count, candidate);
     if (candidate.score > best_.score) best_ = candidate;
@@ -144,7 +157,7 @@ class Fit {
         width *= 2.0;
       }
       if (inside < kRepeated || here == 0.0) continue;
-      if (width > kSmallPart * candidate.mean && b > 1) break;
+      if (width > kSmallPart * candidate.highest && b > 1) break;
       const double rest = total_ - inside;
       double likelihood = inside * quick_log(inside / (total_ * width));
       if (rest > 0.0) {
@@ -163,6 +176,7 @@ class Fit {
     const double sigma = std::max(smallest_, best_.width / 3.0);
     const double wait = std::max(best_.mean, smallest_);
     fit.noise = {{0.5, sigma, wait}, {0.5, sigma, wait}};
+    fit.mean_wait = static_cast<float>(wait);
     fit.estimate.x = 0.5 * (best_.floor.forward - best_.floor.backward);
     fit.estimate.d = 0.5 * (best_.floor.forward + best_.floor.backward) + 1.5 * sigma;
   }
@@ -175,11 +189,9 @@ class Fit {
 
   /// One round of expectation and maximisation. False: nothing determines the
   /// line.
-  [[nodiscard]] bool improve(FloorFit& fit) const noexcept {
+  [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits) const noexcept {
     LineSums sums;
     double squares = 0.0;  // of z
-    double waited = 0.0;
-    double late = 0.0;
     for (const Direction direction : kDirections) {
       const RecordWindow& window = windows_[direction];
       double members = 0.0;
@@ -195,8 +207,8 @@ class Fit {
         sums.add(sign_of(direction), time, left, credit);
         squares += credit * nu * nu;
         members += credit;
-        waited += 1.0 - credit;
-        late += (1.0 - credit) * std::max(nu, 0.0);
+        waits[direction].messages += 1.0 - credit;
+        waits[direction].ns += (1.0 - credit) * std::max(nu, 0.0);
       }
       fit.members[direction] = members;
       const double share = members / static_cast<double>(window.size);
@@ -213,19 +225,37 @@ class Fit {
     fit.estimate = change;
     const double variance = std::max(0.0, squares - explained) / std::max(1.0, sums.n - 3.0);
     const double sigma = std::max(smallest_, std::sqrt(variance));
-    const double wait =
-        waited > 1.0 ? std::max(late / waited, 8.0 * smallest_) : fit.noise.forward.mean_wait;
+    const double waited = waits.forward.messages + waits.backward.messages;
+    if (waited > 1.0) {
+      const double mean = (waits.forward.ns + waits.backward.ns) / waited;
+      fit.mean_wait = static_cast<float>(std::max(mean, 8.0 * smallest_));
+    }
     for (const Direction direction : kDirections) {
       fit.noise[direction].sigma = sigma;
-      fit.noise[direction].mean_wait = wait;
+      fit.noise[direction].mean_wait = static_cast<double>(fit.mean_wait);
     }
     return true;
   }
 
+  /// Two exponentials against one, ln likelihood ratio: sum of n_i ln(tau / tau_i).
+  void tell_apart(FloorFit& fit, const PerDirection<Waits>& waits) const noexcept {
+    const auto together = static_cast<double>(fit.mean_wait);
+    PerDirection<double> own{together, together};
+    double apart = 0.0;
+    for (const Direction direction : kDirections) {
+      const Waits& of = waits[direction];
+      if (fit.clear(direction) || !(of.messages > 1.0)) continue;
+      own[direction] = std::max(of.ns / of.messages, 8.0 * smallest_);
+      apart += of.messages * quick_log(together / own[direction]);
+    }
+    if (!(apart > kCertain)) return;
+    for (const Direction direction : kDirections) fit.noise[direction].mean_wait = own[direction];
+  }
+
   /// Members, likelihoods and whether all that is asked of a floor holds.
   void judge(FloorFit& fit) const noexcept {
-    const double wait = fit.noise.forward.mean_wait;
     const double sigma = fit.sigma();
+    const auto wait = static_cast<double>(fit.mean_wait);
     const double chosen = 1.5 * quick_log(std::max(std::numbers::e, wait / sigma));
     PerDirection<double> speaks{};
     bool lasting = true;
@@ -243,8 +273,9 @@ class Fit {
     } else {
       fit.evidence = ahead ? speaks.backward : speaks.forward;
     }
+    const double longer = std::max(fit.noise.forward.mean_wait, fit.noise.backward.mean_wait);
     fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFew &&
-                sigma < kSharp * wait && WaitDensity::holds(wait);
+                sigma < kSharp * wait && WaitDensity::holds(longer);
   }
 
   /// Nats by which the floor explains one direction better than waits without

@@ -90,13 +90,15 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   if (early && floor_.just_begun()) floor_.unlock();
   if (floor_.never_seen() && contest_ > 0.0) floor_.unlock();
   // What the first picture explains alone and is late for the floor may have waited, for a whole
-  // frame, or fragment, at a time: no end of a floor that is seen as often as before. Noise far
-  // smaller than the floor's is none of a floor. One that is not believed does no harm; if it looks
-  // for a jump it is left to.
+  // frame, or fragment, at a time: no end of a floor that is seen as often as before, nor, for a
+  // vague picture, of one that one direction sees so while the other waits through a burst. Noise
+  // far smaller than the floor's is none of a floor. One that is not believed does no harm; if it
+  // looks for a jump it is left to.
   const bool young = !floor_.proven() || floor_.surmised();
   const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : kCertain;
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
-  const bool unseen = dry && (believed_ || !floor_.seeks_jump());
+  const bool one_way = vague && floor_.seen_one_way();
+  const bool unseen = dry && !one_way && (believed_ || !floor_.seeks_jump());
   const bool ended = early && !vague;
   const bool disproven = ended || finer || unseen || (believed_ && young);
   if (contest_ > enough && (credit > 0.5 || ended) && disproven) floor_.unlock();
