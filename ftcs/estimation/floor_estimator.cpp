@@ -199,7 +199,7 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
 /// Early by next to nothing beside the waits, and those after it are where they were. What is early
 /// by as much as messages wait says that this is not the floor.
 void FloorEstimator::learn_early(Path& path, double nu, double credit) noexcept {
-  constexpr auto part = static_cast<float>(1.0 / kLoadMemory);
+  const auto part = static_cast<float>(1.0 / kLoadMemory);
   path.early -= part * path.early;
   const bool near = -nu < kSharp * static_cast<double>(path.mean_wait);
   if (nu < 0.0 && credit < kUnlikely && near) path.pending = true;
