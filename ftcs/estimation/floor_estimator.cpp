@@ -81,7 +81,7 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
                                                         const Path& path) const noexcept {
   using V = Bank::V;
   const DelayShape noise{path.variance / (scale_ * scale_), 0.0};
-  const double early = std::max(kHardlyEver, static_cast<double>(path.early));
+  const double early = path.early_outliers();
   Bank::Innovations in = bank_.judge(seen, noise, scale_, {}, false);
   for (std::size_t i = 0; i < FloorGrid::kSize; i += Bank::kStep) {
     V other;
@@ -106,8 +106,7 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
 /// size. What is believed is asked under the same.
 void FloorEstimator::watch_jumps(const Observation& seen, const Path& path,
                                  const Bank::Innovations& in) noexcept {
-  const OutlierPrior outliers{1.0 - path.share,
-                              std::max(kHardlyEver, static_cast<double>(path.early))};
+  const OutlierPrior outliers{1.0 - path.share, path.early_outliers()};
   const DelayShape shape{path.variance / (scale_ * scale_), 0.0};
   const double distance = in.distance[best_];
   double log_density = log_normal(distance, in.log_variance[best_]);

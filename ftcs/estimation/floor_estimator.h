@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -137,8 +138,13 @@ class FloorEstimator {
     bool there = false;    ///< the last one was, and since the other direction is dry
     bool pending = false;  ///< an early one that later ones have not explained
     WaitDensity waits{};
-    float early = 0.0F;      ///< probability of an early outlier
+    float early = 0.0F;      ///< share of early outliers, learnt
     float mean_wait = 0.0F;  ///< ns, when the floor was found
+
+    /// Probability of an early outlier.
+    [[nodiscard]] double early_outliers() const noexcept {
+      return std::max(kHardlyEver, static_cast<double>(early));
+    }
   };
 
   /// Messages since it was begun, of the direction that has fewer.
