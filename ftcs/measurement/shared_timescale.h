@@ -26,7 +26,8 @@ namespace ftcs {
 /// not, or less: a response comes right behind a Sync that left 1 ms before it, and D is 1 ms. The
 /// work in a queue falls steadily and rises at once, so the median of such D is not zero. What
 /// differs by more than half of the time to the nearer Sync therefore does not count; by more than
-/// the time between two Syncs nothing waits.
+/// the time between two Syncs nothing waits. Where frames are of one length even what counts is one
+/// value (a frame less the millisecond), but then what does not count says something else.
 class SharedTimescale {
  public:
   enum class Verdict : std::uint8_t {
@@ -35,7 +36,8 @@ class SharedTimescale {
     kForeign,  ///< until reset()
   };
   /// Differences before the first verdict, and how many the median is of: kShared is said from the
-  /// fewest on, where |median| <= 3 standard errors; kForeign only of a full window, beyond 8.
+  /// fewest on, where |median| <= 3 standard errors; kForeign only of a full window, beyond 8, and
+  /// if less than a quarter of the last differences speak against the median.
   static constexpr std::size_t kFewest = 4;
   static constexpr std::size_t kWindow = 64;
 
@@ -78,6 +80,8 @@ class SharedTimescale {
   /// Of the differences so many count at least where the time is one: of a time that is off by as
   /// much as the messages are apart, those alone count that noise makes small.
   static constexpr double kClearPart = 0.25;
+  /// Of another time all differences say the same, those that do not count too.
+  static constexpr double kAgainstPart = 0.25;
 
   void compare() noexcept {
     const double span = (sync_.free_running - previous_.free_running).ns();
@@ -91,6 +95,8 @@ class SharedTimescale {
     const bool clear = 2.0 * off <= std::min(ahead, span - ahead) || off > span;
     compared_ = std::min(compared_ + 1, kWindow);
     clear_part_ += ((clear ? 1.0 : 0.0) - clear_part_) / static_cast<double>(compared_);
+    const bool against = !clear && std::abs(difference - median_) >= std::abs(median_);
+    against_part_ += ((against ? 1.0 : 0.0) - against_part_) / static_cast<double>(compared_);
     if (!clear) return;
     unchecked_ = 0;
     differences_[next_] = difference;
@@ -105,7 +111,8 @@ class SharedTimescale {
     for (std::size_t i = 0; i < size_; ++i) distances[i] = std::abs(differences_[i] - median_);
     const double sigma = kMadToSigma * std::max(kLeastMadNs, median_of(distances));
     const double error = kMedianError * sigma / std::sqrt(static_cast<double>(size_));
-    if (size_ == kWindow && std::abs(median_) > kForeignAbove * error) {
+    const bool differs = size_ == kWindow && std::abs(median_) > kForeignAbove * error;
+    if (differs && against_part_ < kAgainstPart) {
       verdict_ = Verdict::kForeign;
     } else if (std::abs(median_) <= kSharedBelow * error && clear_part_ >= kClearPart) {
       verdict_ = Verdict::kShared;
@@ -129,7 +136,8 @@ class SharedTimescale {
   std::size_t next_ = 0;
   std::size_t size_ = 0;
   std::size_t compared_ = 0;
-  double clear_part_ = 0.0;  ///< of the last that could be compared
+  double clear_part_ = 0.0;    ///< of the last that could be compared
+  double against_part_ = 0.0;  ///< likewise: does not count, and contradicts the median
   double median_ = 0.0;
 };
 

@@ -136,6 +136,28 @@ TEST_F(SharedTimescaleTest, a_response_right_behind_a_sync_that_waited_is_no_dif
   }
 }
 
+/// Bursts: a Sync and the response behind it are together, or one frame apart, which is always the
+/// same difference.
+TEST_F(SharedTimescaleTest, long_frames_that_nearly_fill_a_link_are_no_difference) {
+  Queue queue{2e6, 0.95};
+  double at = 0.0;
+  const auto exchange = [&](bool busy) {
+    for (const double behind : {0.0, 1.2e6}) {
+      const double sent = at + behind;
+      const double received = sent + (busy ? queue.wait(sent, random) : 0.0) + normal(random, 20.0);
+      const EventPair heard = pair(received * 1e-9, sent - received);
+      behind > 0.0 ? watch.on_response(heard) : watch.on_sync(heard);
+    }
+    at += 125e6;
+  };
+  for (int i = 0; i < 100; ++i) exchange(false);
+  ASSERT_EQ(watch.verdict(), Verdict::kShared);
+  for (int i = 0; i < 20'000; ++i) {
+    exchange(true);
+    ASSERT_NE(watch.verdict(), Verdict::kForeign) << i;
+  }
+}
+
 TEST_F(SharedTimescaleTest, a_time_that_is_off_by_as_much_as_messages_are_apart_is_not_shared) {
   for (const double off : {30e3, 40e3, 1e6}) {
     watch.reset();
