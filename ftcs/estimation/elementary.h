@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
+
 namespace ftcs::estimation {
 
 /// Exponential and logarithm to the last bits and the tail of the normal distribution, of IEEE
@@ -24,5 +26,11 @@ namespace ftcs::estimation {
 /// (1 + 2 x) e^(x^2) erfc(x) is smooth in (x - 15/4) / (x + 15/4), from 0 to infinity (Shepherd and
 /// Laframboise, Mathematics of Computation 36, 1981): its Chebyshev series to degree 22.
 [[nodiscard]] double scaled_erfc(double x) noexcept;
+
+/// The fraction of n / phi less a half, phi the golden ratio: spread more evenly over -1/2 to 1/2
+/// than chance would, from any n on (Weyl, Mathematische Annalen 77, 1916).
+[[nodiscard]] constexpr double even_spread(std::uint32_t n) noexcept {
+  return 0x1p-32 * static_cast<double>(n * 2'654'435'769U) - 0.5;
+}
 
 }  // namespace ftcs::estimation

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -79,6 +80,17 @@ TEST(ScaledErfc, is_within_seven_units_in_the_last_place) {
     EXPECT_LT(most, 7.0) << reach;
   }
   EXPECT_EQ(scaled_erfc(0.0), 1.0);
+}
+
+TEST(EvenSpread, any_values_in_a_row_are_spread_evenly) {
+  for (const std::uint32_t from : {0U, 1000U, 4'294'967'290U}) {  // the last runs over the end
+    std::vector<double> values;
+    for (std::uint32_t i = 0; i < 34; ++i) values.push_back(even_spread(from + i));
+    std::sort(values.begin(), values.end());
+    EXPECT_GE(values.front(), -0.5);
+    EXPECT_LT(values.back(), 0.5);
+    for (std::size_t i = 1; i < values.size(); ++i) EXPECT_LT(values[i] - values[i - 1], 0.035);
+  }
 }
 
 }  // namespace

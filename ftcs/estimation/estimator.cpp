@@ -7,6 +7,7 @@
 #include <new>
 
 #include "ftcs/estimation/belief.h"
+#include "ftcs/estimation/elementary.h"
 
 namespace ftcs::estimation {
 namespace {
@@ -212,14 +213,21 @@ void Estimator<Grid>::heed(const Observation& seen, const Innovations& innovatio
 template <class Grid>
 void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
                                   const Innovations& innovations) noexcept {
+  // Of a clock that follows the reference most residuals are one of a few values, whole steps of
+  // the stamps, and the median of such is another one every time (nothing at all, where half are
+  // zero).
+  const double dither = std::sqrt(6.0) * least_noise_ * even_spread(count_);
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
-    if (since_change_ > 0) residuals_.push(scale_ * std::sqrt(innovations.distance[best_]));
+    if (since_change_ > 0) {
+      const double sigmas = innovations.centred[best_] / std::sqrt(innovations.variance[best_]);
+      residuals_.push(std::abs(scale_ * sigmas + dither));
+    }
     follow_scale();
   }
   if (count_ > kLearnFrom) {
     const NoiseSample sample{innovation, innovations.predicted[best_], robust_scale_,
-                             since_change_ > kLately};
+                             since_change_ > kLately, dither};
     if (learner_[side].learn(sample, shape_[side])) {
       const auto taken = static_cast<std::uint32_t>(learner_[side].count());
       const std::size_t other = 1 - side;
@@ -254,7 +262,7 @@ void Estimator<Grid>::seek_second_opinion(const Observation& seen, double innova
   const double usual = content ? kSettledContradiction : kContradiction;
   const double contradiction = young ? kYoungContradiction : usual;
   const FreshFit fit =
-      second_opinion_.consult({delay_free(), known_delay().mean_ns, contradiction});
+      second_opinion_.consult({delay_free(), known_delay().mean_ns, contradiction, least_noise_});
   if (fit.better) start_again(fit);
 }
 

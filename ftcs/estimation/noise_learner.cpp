@@ -51,7 +51,7 @@ double spoilt_log_density(double w) noexcept {
 
 template <std::size_t Window>
 bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& shape) noexcept {
-  recent_.push(sample.innovation);
+  recent_.push(sample.innovation + sample.dither);
   if (recent_.size() < kLately) return false;
   const double median = recent_.median();
   const double robust = kMadToSigma * recent_.median_deviation();

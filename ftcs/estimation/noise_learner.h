@@ -16,6 +16,7 @@ struct NoiseSample {
   double predicted = 0.0;     ///< h P h', units of s^2
   double robust_scale = 0.0;  ///< median scale of all innovations, ns
   bool settled = false;       ///< no recent change was noticed
+  double dither = 0.0;        ///< what makes rounded values even for their median, ns
 };
 
 /// Learns size and shape of the delay noise of one direction.

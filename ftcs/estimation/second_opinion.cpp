@@ -192,7 +192,7 @@ double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
     squares += r * r;
     members += 1.0;
   }
-  return std::max(kLeastNoise, std::sqrt(squares / std::max(members, 1.0)));
+  return std::sqrt(squares / std::max(members, 1.0));
 }
 
 /// Distance of a message from the chord of its neighbours of the same
@@ -267,8 +267,10 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const double freedom = static_cast<double>(best_kept.count - unknowns);
   result.scale_ns = std::max(kLeastNoise, std::sqrt(best / freedom));
   const double needed = question.contradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
-  result.better = contradicted(needed * left_by(result.estimate, best_kept, 1.0),
-                               needed * left_by(result.estimate, best_kept, -1.0));
+  const auto left = [&](double sign) {
+    return std::max(question.least_noise, left_by(result.estimate, best_kept, sign));
+  };
+  result.better = contradicted(needed * left(1.0), needed * left(-1.0));
   return result;
 }
 

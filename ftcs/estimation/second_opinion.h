@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/model_bank.h"
 
 namespace ftcs::estimation {
@@ -25,6 +26,8 @@ struct OpinionQuestion {
   /// The fit is better if it leaves residuals so many times below the
   /// innovations; with few messages more is needed.
   double contradiction = 10.0;
+  /// Noise that stamps have in any case, ns (rounding): a fit that leaves less is no better for it.
+  double least_noise = kLeastNoise;
 };
 
 /// So many as can make filters diverge.

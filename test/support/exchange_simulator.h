@@ -53,6 +53,7 @@ struct ExchangeScenario {
   bool one_way = false;  ///< no Delay_Req at all
   double loss_probability = 0.0;
   double tick_ns = 0.0;  ///< local stamps are multiples of this (rounded down)
+  double step_ns = 0.0;  ///< every stamp is a multiple of this of its own clock (rounded down)
 };
 
 struct ExchangeResult {
@@ -198,11 +199,18 @@ class ExchangeSimulator {
     return Duration::from_whole_ns(kEpoch) + Duration::from_ns(ns) + Duration::from_ns(lead);
   }
 
-  TimestampPair stamp(Direction direction, double reference_time) const {
+  double rounded_off(double shown) const {
+    return scenario_.step_ns > 0.0 ? std::fmod(shown, scenario_.step_ns) : 0.0;
+  }
+  Duration reference_stamp(double when) const {
+    return instant(when, reference_lead_ - rounded_off(when + reference_lead_));
+  }
+
+  /// All but the reference's own stamp.
+  TimestampPair stamp(Direction direction) const {
     TimestampPair pair;
     pair.direction = direction;
-    pair.reference = ReferenceTime{instant(reference_time, reference_lead_)};
-    double lost = 0.0;
+    double lost = rounded_off(now_ + lead_ + local_lead_);
     if (scenario_.tick_ns > 0.0) lost = std::fmod(now_ + lead_, scenario_.tick_ns);
     pair.free_running = FreeRunningTime{instant(now_, lead_ - lost)};
     pair.local = LocalTime{instant(now_, lead_ + local_lead_ - lost)};
@@ -234,11 +242,11 @@ class ExchangeSimulator {
         next_sync_ += interval_;
         if (!lost(now_)) {
           sync_in_flight_ = true;
-          sync_reference_ = instant(when, reference_lead_);
+          sync_reference_ = reference_stamp(when);
           sync_arrival_ = when + delay(true);
         }
       } else if (what == kRequest) {
-        request_ = stamp(Direction::kBackward, 0.0);
+        request_ = stamp(Direction::kBackward);
         schedule_request();
         if (!lost(now_)) {
           request_in_flight_ = true;
@@ -246,12 +254,12 @@ class ExchangeSimulator {
         }
       } else if (what == kReceive) {
         sync_in_flight_ = false;
-        TimestampPair pair = stamp(Direction::kForward, 0.0);
+        TimestampPair pair = stamp(Direction::kForward);
         pair.reference = ReferenceTime{sync_reference_};
         feed(pair);
       } else if (what == kRequestArrives) {
         request_in_flight_ = false;
-        request_.reference = ReferenceTime{instant(when, reference_lead_)};
+        request_.reference = ReferenceTime{reference_stamp(when)};
         report_pending_ = true;
         report_time_ = when + 20'000.0;
         report_ = request_;

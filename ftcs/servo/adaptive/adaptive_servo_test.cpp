@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -86,6 +87,54 @@ TEST(AdaptiveServo, follows_frequency_steps) {
   ExchangeScenario scenario;
   scenario.square_ppm = 1.0;
   EXPECT_LE(run(scenario).rms, 185.0);
+}
+
+/// Two clocks whose stamps have the same steps, one steered to the other: what each stamp loses is
+/// the same, and what is left of noise are a few values.
+ExchangeScenario stepped(double step_ns, double noise_ns) {
+  ExchangeScenario scenario;
+  scenario.interval_s = 0.125000001371;  // on no grid of the steps
+  scenario.cycles = 2400;
+  scenario.skew_ppm = 20.0;
+  scenario.path_delay_ns = 1'000.0;
+  scenario.noise_ns = noise_ns;
+  scenario.step_ns = step_ns;
+  return scenario;
+}
+
+/// Without noise the last messages lie on one line to the digit: nothing is to be begun anew for
+/// that (2 ns at most without the second opinion's least_noise).
+TEST(AdaptiveServo, a_path_without_noise_is_followed_below_the_steps_of_its_stamps) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    ExchangeSimulator<AdaptiveServo> simulator(stepped(1.0, 0.0), AdaptiveServo{}, seed);
+    EXPECT_LE(simulator.run().max_ns, 0.3) << seed;
+  }
+}
+
+/// With less noise than a step or two most residuals are one value, and their median is none of
+/// their size (10 to 70 ns at most
+/// without the dither of the learner's window).
+TEST(AdaptiveServo, steps_of_eight_nanoseconds_are_averaged_away) {
+  for (const double noise : {4.0, 6.0, 8.0}) {
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      ExchangeSimulator<AdaptiveServo> simulator(stepped(8.0, noise), AdaptiveServo{}, seed);
+      const ExchangeResult result = simulator.run();
+      EXPECT_LE(result.max_ns, 4.0) << noise << ", " << seed;
+      EXPECT_LE(result.rms_ns, 0.8) << noise << ", " << seed;
+    }
+  }
+}
+
+/// Before variances have been learnt too (1.9 ns without the dither of the residuals).
+TEST(AdaptiveServo, steps_of_eight_nanoseconds_are_averaged_away_from_the_fifth_second_on) {
+  ExchangeScenario scenario = stepped(8.0, 4.0);
+  scenario.cycles = 64;
+  std::vector<double> rms;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    ExchangeSimulator<AdaptiveServo> simulator(scenario, AdaptiveServo{}, seed);
+    rms.push_back(simulator.run().rms_ns);
+  }
+  EXPECT_LE(std::accumulate(rms.begin(), rms.end(), 0.0) / static_cast<double>(rms.size()), 1.3);
 }
 
 TEST(AdaptiveServo, one_direction_suffices_if_the_path_delay_is_known) {
