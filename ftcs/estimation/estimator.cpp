@@ -214,20 +214,20 @@ template <class Grid>
 void Estimator<Grid>::learn_noise(std::size_t side, double innovation,
                                   const Innovations& innovations) noexcept {
   // Of a clock that follows the reference most residuals are one of a few values, whole steps of
-  // the stamps, and the median of such is another one every time (nothing at all, where half are
-  // zero).
-  const double dither = std::sqrt(6.0) * least_noise_ * even_spread(count_);
+  // the stamps: of such the median is nothing where half are zero. A step q makes noise of
+  // q / sqrt(6) where both stamps show it, of q / sqrt(12) where steering hides it in one.
+  const double step = 3.0 * least_noise_;
   if (evidence_.messages() > 0.0 || count_ > kEvidenceFrom) {
     // What showed a change is not noise.
     if (since_change_ > 0) {
-      const double sigmas = innovations.centred[best_] / std::sqrt(innovations.variance[best_]);
-      residuals_.push(std::abs(scale_ * sigmas + dither));
+      const double dithered = innovations.centred[best_] + step * even_spread(count_);
+      residuals_.push(scale_ * std::abs(dithered) / std::sqrt(innovations.variance[best_]));
     }
     follow_scale();
   }
   if (count_ > kLearnFrom) {
     const NoiseSample sample{innovation, innovations.predicted[best_], robust_scale_,
-                             since_change_ > kLately, dither};
+                             since_change_ > kLately, step};
     if (learner_[side].learn(sample, shape_[side])) {
       const auto taken = static_cast<std::uint32_t>(learner_[side].count());
       const std::size_t other = 1 - side;

@@ -51,7 +51,8 @@ double spoilt_log_density(double w) noexcept {
 
 template <std::size_t Window>
 bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& shape) noexcept {
-  recent_.push(sample.innovation + sample.dither);
+  const double dithered = sample.innovation + sample.step * even_spread(++heard_);
+  recent_.push(dithered);
   if (recent_.size() < kLately) return false;
   const double median = recent_.median();
   const double robust = kMadToSigma * recent_.median_deviation();
@@ -92,7 +93,7 @@ bool NoiseLearner<Window>::learn(const NoiseSample& sample, const DelayShape& sh
       follow(ratio_[i], standard_late_log_density(w, kTailShares[i]));
     }
     const double body = static_cast<double>(body_deviation_);
-    const double from_body = (sample.innovation - static_cast<double>(body_mean_)) / body;
+    const double from_body = (dithered - static_cast<double>(body_mean_)) / body;
     follow(spoilt_, spoilt_log_density(from_body) + quick_log(deviation / body));
   }
   return true;

@@ -16,7 +16,7 @@ struct NoiseSample {
   double predicted = 0.0;     ///< h P h', units of s^2
   double robust_scale = 0.0;  ///< median scale of all innovations, ns
   bool settled = false;       ///< no recent change was noticed
-  double dither = 0.0;        ///< what makes rounded values even for their median, ns
+  double step = 0.0;          ///< of the stamps, ns: what innovations may be multiples of
 };
 
 /// Learns size and shape of the delay noise of one direction.
@@ -26,6 +26,9 @@ struct NoiseSample {
 /// own error is not taken for noise. Whether part of it is queueing (late only)
 /// is decided by the likelihood ratio of three shapes against the normal one;
 /// the size of the tail then follows from m2: tail = k sqrt(m2).
+///
+/// Medians are taken of innovations dithered by a step of the stamps: without noise beside the
+/// rounding most are one value, and their median deviation is nothing.
 template <std::size_t Window>
 class NoiseLearner {
  public:
@@ -66,6 +69,7 @@ class NoiseLearner {
   static constexpr std::array<double, 3> kTailShares = {0.99, 0.9, 0.75};
 
   SortedWindow<Window> recent_;
+  std::uint32_t heard_ = 0;
   double count_ = 0.0;
   double mean_ = 0.0;
   double variance_ = 0.0;

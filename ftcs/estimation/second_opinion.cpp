@@ -238,7 +238,10 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   // No fit leaves much less than the roughness, which is the larger part of the noise: where
   // innovations are not far above that, save the work.
   const double worth = (1.0 - kOften) * question.contradiction;
-  if (!contradicted(worth * roughness(1.0), worth * roughness(-1.0))) return result;
+  const auto rough = [&](double sign) {
+    return worth * std::max(question.least_noise, roughness(sign));
+  };
+  if (!contradicted(rough(1.0), rough(-1.0))) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
   Kept best_kept;

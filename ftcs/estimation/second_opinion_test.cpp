@@ -91,6 +91,19 @@ TEST_F(SecondOpinionTest, one_direction_with_a_known_delay_suffices) {
   EXPECT_DOUBLE_EQ(fit.estimate.d, kD);
 }
 
+/// Stamps of whole nanoseconds of a clock that is steered to the reference.
+TEST_F(SecondOpinionTest, a_line_to_the_digit_is_no_better_than_innovations_below_the_rounding) {
+  for (const double innovation : {0.1, 100.0}) {
+    opinion_.clear();
+    for (int i = 0; i < 16; ++i) {
+      const double sign = i % 2 == 0 ? 1.0 : -1.0;
+      opinion_.push({sign, i == 0 ? 0.0 : 0.5, kX + kY * 0.5 * (i - 15) + sign * kD}, innovation);
+    }
+    EXPECT_TRUE(opinion_.consult({true, 0.0}).better) << innovation;
+    EXPECT_EQ(opinion_.consult({true, 0.0, 10.0, 0.4}).better, innovation > 1.0) << innovation;
+  }
+}
+
 TEST_F(SecondOpinionTest, gives_the_last_messages_in_their_order) {
   for (int i = 0; i < 3; ++i) feed(0.0, 0.0);
   const LastMessages few = opinion_.last();

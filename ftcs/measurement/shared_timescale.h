@@ -27,7 +27,7 @@ namespace ftcs {
 /// work in a queue falls steadily and rises at once, so the median of such D is not zero. What
 /// differs by more than half of the time to the nearer Sync therefore does not count; by more than
 /// the time between two Syncs nothing waits. Where frames are of one length even what counts is one
-/// value (a frame less the millisecond), but then what does not count says something else.
+/// value (a frame less the millisecond), but then much of what does not count has the other sign.
 class SharedTimescale {
  public:
   enum class Verdict : std::uint8_t {
@@ -37,7 +37,7 @@ class SharedTimescale {
   };
   /// Differences before the first verdict, and how many the median is of: kShared is said from the
   /// fewest on, where |median| <= 3 standard errors; kForeign only of a full window, beyond 8, and
-  /// if less than a quarter of the last differences speak against the median.
+  /// if less than a quarter of the last differences do not count and have the other sign.
   static constexpr std::size_t kFewest = 4;
   static constexpr std::size_t kWindow = 64;
 
@@ -80,7 +80,8 @@ class SharedTimescale {
   /// Of the differences so many count at least where the time is one: of a time that is off by as
   /// much as the messages are apart, those alone count that noise makes small.
   static constexpr double kClearPart = 0.25;
-  /// Of another time all differences say the same, those that do not count too.
+  /// Of another time, where few messages wait, nearly all differences are on one side of zero,
+  /// those that do not count too.
   static constexpr double kAgainstPart = 0.25;
 
   void compare() noexcept {
@@ -95,7 +96,7 @@ class SharedTimescale {
     const bool clear = 2.0 * off <= std::min(ahead, span - ahead) || off > span;
     compared_ = std::min(compared_ + 1, kWindow);
     clear_part_ += ((clear ? 1.0 : 0.0) - clear_part_) / static_cast<double>(compared_);
-    const bool against = !clear && std::abs(difference - median_) >= std::abs(median_);
+    const bool against = !clear && difference * median_ <= 0.0;
     against_part_ += ((against ? 1.0 : 0.0) - against_part_) / static_cast<double>(compared_);
     if (!clear) return;
     unchecked_ = 0;

@@ -158,6 +158,31 @@ TEST_F(SharedTimescaleTest, long_frames_that_nearly_fill_a_link_are_no_differenc
   }
 }
 
+/// What messages wait for, now and then, is no excuse for it.
+TEST_F(SharedTimescaleTest, a_time_that_departs_is_found_out_where_one_message_of_five_waits) {
+  for (const double behind : {1e5, 1.2e6, 2e7}) {
+    for (const double off : {-1e3, 100.0, 1e3, 37e9}) {
+      watch.reset();
+      Queue queue{120e3, 0.2};
+      double at = 0.0;
+      const auto exchange = [&](double ahead) {
+        for (const double after : {0.0, behind}) {
+          const double sent = at + after;
+          const double received = sent + queue.wait(sent, random) + normal(random, 20.0);
+          const double shown = sent - received + (after > 0.0 ? ahead : 0.0);
+          const EventPair heard = pair(received * 1e-9, shown);
+          after > 0.0 ? watch.on_response(heard) : watch.on_sync(heard);
+        }
+        at += 125e6;
+      };
+      for (int i = 0; i < 200; ++i) exchange(0.0);
+      ASSERT_EQ(watch.verdict(), Verdict::kShared);
+      for (int i = 0; i < 300; ++i) exchange(off);
+      EXPECT_EQ(watch.verdict(), Verdict::kForeign) << behind << ", " << off;
+    }
+  }
+}
+
 TEST_F(SharedTimescaleTest, a_time_that_is_off_by_as_much_as_messages_are_apart_is_not_shared) {
   for (const double off : {30e3, 40e3, 1e6}) {
     watch.reset();

@@ -53,7 +53,7 @@ struct ExchangeScenario {
   bool one_way = false;  ///< no Delay_Req at all
   double loss_probability = 0.0;
   double tick_ns = 0.0;  ///< local stamps are multiples of this (rounded down)
-  double step_ns = 0.0;  ///< every stamp is a multiple of this of its own clock (rounded down)
+  double step_ns = 0.0;  ///< reference and steered clock show multiples of this (rounded down)
 };
 
 struct ExchangeResult {
