@@ -192,7 +192,7 @@ double SecondOpinion<Capacity>::left_by(const Estimate& line, const Kept& kept,
     squares += r * r;
     members += 1.0;
   }
-  return std::sqrt(squares / std::max(members, 1.0));
+  return std::max(kLeastNoise, std::sqrt(squares / std::max(members, 1.0)));
 }
 
 /// Distance of a message from the chord of its neighbours of the same
@@ -236,7 +236,8 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const double known_delay = question.known_delay;
   FreshFit result;
   // No fit leaves much less than the roughness, which is the larger part of the noise: where
-  // innovations are not far above that, save the work.
+  // innovations are not far above that, save the work. Messages on a line to the digit have none,
+  // and are no reason to begin anew.
   const double worth = (1.0 - kOften) * question.contradiction;
   const auto rough = [&](double sign) {
     return worth * std::max(question.least_noise, roughness(sign));
@@ -270,10 +271,8 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const double freedom = static_cast<double>(best_kept.count - unknowns);
   result.scale_ns = std::max(kLeastNoise, std::sqrt(best / freedom));
   const double needed = question.contradiction * std::sqrt(std::max(1.0, kFullFreedom / freedom));
-  const auto left = [&](double sign) {
-    return std::max(question.least_noise, left_by(result.estimate, best_kept, sign));
-  };
-  result.better = contradicted(needed * left(1.0), needed * left(-1.0));
+  result.better = contradicted(needed * left_by(result.estimate, best_kept, 1.0),
+                               needed * left_by(result.estimate, best_kept, -1.0));
   return result;
 }
 

@@ -26,8 +26,7 @@ struct OpinionQuestion {
   /// The fit is better if it leaves residuals so many times below the
   /// innovations; with few messages more is needed.
   double contradiction = 10.0;
-  /// Noise that stamps have in any case, ns (rounding), above zero: a fit that leaves less is no
-  /// better for it.
+  /// Noise that stamps have in any case, ns (rounding): innovations not far above it need no fit.
   double least_noise = kLeastNoise;
 };
 
