@@ -95,9 +95,11 @@ class SharedTimescale {
     const double off = std::abs(difference);
     const bool clear = 2.0 * off <= std::min(ahead, span - ahead) || off > span;
     compared_ = std::min(compared_ + 1, kWindow);
-    clear_part_ += ((clear ? 1.0 : 0.0) - clear_part_) / static_cast<double>(compared_);
-    const bool against = !clear && difference * median_ <= 0.0;
-    against_part_ += ((against ? 1.0 : 0.0) - against_part_) / static_cast<double>(compared_);
+    const auto count = [this](double& part, bool one_more) {
+      part += ((one_more ? 1.0 : 0.0) - part) / static_cast<double>(compared_);
+    };
+    count(clear_part_, clear);
+    count(against_part_, !clear && difference * median_ <= 0.0);
     if (!clear) return;
     unchecked_ = 0;
     differences_[next_] = difference;
@@ -138,7 +140,7 @@ class SharedTimescale {
   std::size_t size_ = 0;
   std::size_t compared_ = 0;
   double clear_part_ = 0.0;    ///< of the last that could be compared
-  double against_part_ = 0.0;  ///< likewise: does not count, and contradicts the median
+  double against_part_ = 0.0;  ///< likewise: does not count, other sign than the median
   double median_ = 0.0;
 };
 

@@ -114,20 +114,39 @@ class Queue {
   double work_ = 0.0, then_ = 0.0, next_ = 0.0;  ///< ns
 };
 
-TEST_F(SharedTimescaleTest, a_response_right_behind_a_sync_that_waited_is_no_difference) {
+class SharedTimescaleBehindAQueue : public SharedTimescaleTest {
+ protected:
+  /// A Sync and the response that leaves so much later, whose stamp is `ahead` of the
+  /// transmitter's time; ns. The next Sync leaves `interval` later.
+  void exchange(Queue* queue, double behind, double interval, double ahead = 0.0) {
+    watch.on_sync(heard(queue, 0.0, 0.0));
+    watch.on_response(heard(queue, behind, ahead));
+    sent_ += interval;
+  }
+  void begin() {
+    watch.reset();
+    sent_ = 0.0;
+  }
+
+ private:
+  EventPair heard(Queue* queue, double after, double ahead) {
+    const double sent = sent_ + after;
+    const double wait = queue == nullptr ? 0.0 : queue->wait(sent, random);
+    const double received = sent + wait + normal(random, 20.0);
+    return pair(received * 1e-9, sent - received + ahead);
+  }
+  double sent_ = 0.0;
+};
+
+TEST_F(SharedTimescaleBehindAQueue, a_response_right_behind_a_sync_that_waited_is_no_difference) {
   constexpr double kInterval = 15'625'000.0;
   for (const double load : {0.2, 0.4, 0.6}) {
     for (const double behind : {1e5, 1e6, 1.46e7}) {
-      watch.reset();
+      begin();
       Queue queue{2e6, load};
-      const auto heard = [&](double sent) {
-        const double received = sent + queue.wait(sent, random) + normal(random, 20.0);
-        return pair(received * 1e-9, sent - received);
-      };
       int shared = 0;
       for (int i = 0; i < 20'000; ++i) {
-        watch.on_sync(heard(i * kInterval));
-        watch.on_response(heard(i * kInterval + behind));
+        exchange(&queue, behind, kInterval);
         ASSERT_NE(watch.verdict(), Verdict::kForeign) << load << ", " << behind << ", " << i;
         shared += watch.verdict() == Verdict::kShared ? 1 : 0;
       }
@@ -138,46 +157,25 @@ TEST_F(SharedTimescaleTest, a_response_right_behind_a_sync_that_waited_is_no_dif
 
 /// Bursts: a Sync and the response behind it are together, or one frame apart, which is always the
 /// same difference.
-TEST_F(SharedTimescaleTest, long_frames_that_nearly_fill_a_link_are_no_difference) {
+TEST_F(SharedTimescaleBehindAQueue, long_frames_that_nearly_fill_a_link_are_no_difference) {
   Queue queue{2e6, 0.95};
-  double at = 0.0;
-  const auto exchange = [&](bool busy) {
-    for (const double behind : {0.0, 1.2e6}) {
-      const double sent = at + behind;
-      const double received = sent + (busy ? queue.wait(sent, random) : 0.0) + normal(random, 20.0);
-      const EventPair heard = pair(received * 1e-9, sent - received);
-      behind > 0.0 ? watch.on_response(heard) : watch.on_sync(heard);
-    }
-    at += 125e6;
-  };
-  for (int i = 0; i < 100; ++i) exchange(false);
+  for (int i = 0; i < 100; ++i) exchange(nullptr, 1.2e6, 125e6);
   ASSERT_EQ(watch.verdict(), Verdict::kShared);
   for (int i = 0; i < 20'000; ++i) {
-    exchange(true);
+    exchange(&queue, 1.2e6, 125e6);
     ASSERT_NE(watch.verdict(), Verdict::kForeign) << i;
   }
 }
 
 /// What messages wait for, now and then, is no excuse for it.
-TEST_F(SharedTimescaleTest, a_time_that_departs_is_found_out_where_one_message_of_five_waits) {
+TEST_F(SharedTimescaleBehindAQueue, a_time_that_departs_where_one_message_of_five_waits_is_found) {
   for (const double behind : {1e5, 1.2e6, 2e7}) {
     for (const double off : {-1e3, 100.0, 1e3, 37e9}) {
-      watch.reset();
+      begin();
       Queue queue{120e3, 0.2};
-      double at = 0.0;
-      const auto exchange = [&](double ahead) {
-        for (const double after : {0.0, behind}) {
-          const double sent = at + after;
-          const double received = sent + queue.wait(sent, random) + normal(random, 20.0);
-          const double shown = sent - received + (after > 0.0 ? ahead : 0.0);
-          const EventPair heard = pair(received * 1e-9, shown);
-          after > 0.0 ? watch.on_response(heard) : watch.on_sync(heard);
-        }
-        at += 125e6;
-      };
-      for (int i = 0; i < 200; ++i) exchange(0.0);
+      for (int i = 0; i < 200; ++i) exchange(&queue, behind, 125e6);
       ASSERT_EQ(watch.verdict(), Verdict::kShared);
-      for (int i = 0; i < 300; ++i) exchange(off);
+      for (int i = 0; i < 300; ++i) exchange(&queue, behind, 125e6, off);
       EXPECT_EQ(watch.verdict(), Verdict::kForeign) << behind << ", " << off;
     }
   }

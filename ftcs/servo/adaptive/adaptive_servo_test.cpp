@@ -141,7 +141,7 @@ TEST(AdaptiveServo, steps_of_eight_nanoseconds_are_averaged_away_from_the_fifth_
   EXPECT_LE(mean_rms<AdaptiveServo>(scenario, 60), 1.3);
 }
 
-/// It has the median of the residuals alone (1.6 ns without their dither).
+/// It has the median of the residuals alone (1.8 ns without their dither).
 TEST(AdaptiveServo, the_small_variant_averages_steps_away) {
   EXPECT_LE(mean_rms<SmallAdaptiveServo>(stepped(8.0, 4.0), 9), 0.8);
 }
