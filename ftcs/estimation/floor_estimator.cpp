@@ -255,8 +255,13 @@ void FloorEstimator::mix() noexcept {
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
   if (!locked_) return {};
+  // A floor with far more noise in one direction than in the other may be made of short waits
+  // there, beside long ones of the other: a finer one is looked for on.
+  const double ahead = noise_ns(Direction::kForward);
+  const double back = noise_ns(Direction::kBackward);
+  const bool uneven = kMuch * std::min(ahead, back) < std::max(ahead, back);
   return {true,
-          found_,
+          found_ && !uneven,
           mixed_.x,
           scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
           mixed_.y,

@@ -27,8 +27,8 @@ class FloorSearch {
   /// must be.
   struct Rival {
     bool there = false;
-    /// By a search, or by lucky messages: another is looked for after an alarm
-    /// alone. A floor that was only begun is looked for on.
+    /// By a search, or by lucky messages, and of one noise: another is looked for after an alarm
+    /// alone. Otherwise it is looked for on.
     bool found = false;
     double offset = 0.0;           ///< ns, at the last message
     double offset_sigma = 0.0;     ///< ns

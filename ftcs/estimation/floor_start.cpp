@@ -13,8 +13,8 @@ namespace {
 /// Start of the filters that hear the members of a fit once more, in units of
 /// its noise.
 constexpr double kWide = 1e4;
-/// The noise of a line contains what the oscillator did; the filters tell the
-/// two apart.
+/// The noise of a line contains what the oscillator did; the filters tell the two apart. A dozen
+/// messages do so badly: wild models explain them with hardly any noise.
 constexpr double kMostPart = 2.0;
 
 }  // namespace
@@ -115,7 +115,7 @@ void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
   if (!(evidence_.messages() > 0.0)) return;
   best_ = evidence_.weigh(weight_);
   const double seen = std::sqrt(evidence_.mean_square(best_));
-  scale_ = std::clamp(seen, least_noise_, kMostPart * scale_);
+  scale_ = std::max(least_noise_, std::clamp(seen, scale_ / kMostPart, kMostPart * scale_));
 }
 
 void FloorEstimator::take_from(const ModelBank<FullGrid>& bank, const Evidence<FullGrid>& evidence,

@@ -84,7 +84,10 @@ JumpWatch::Verdict JumpWatch::judge(double rival) const noexcept {
   if (!best.alive() || best.lead() <= 0.0 || best.lead() <= rival) {
     return Verdict::kNothing;
   }
-  return best.certain() ? Verdict::kJumped : Verdict::kWait;
+  // What spoke for a jump of the delay may be from before the clock has jumped: the offset's has to
+  // be plainly worse.
+  const bool disputed = &best == &delay_ && best.lead() < offset_.lead() + kConvincing;
+  return best.certain() && !disputed ? Verdict::kJumped : Verdict::kWait;
 }
 
 void JumpWatch::clear() noexcept {

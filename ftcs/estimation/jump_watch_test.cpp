@@ -103,6 +103,22 @@ TEST(JumpWatch, waits_for_certainty_of_a_longer_path_and_leaves_the_offset_alone
   EXPECT_NEAR(calm.watch().estimate().d, kPath + 15'000.0, 150.0);
 }
 
+/// A message of each direction that is early, the first of them by chance, speaks for a shorter
+/// path; that the clock has jumped by as much is told by one direction alone.
+TEST(JumpWatch, what_spoke_for_the_delay_before_does_not_decide_against_the_offset) {
+  Calm calm;
+  EXPECT_NE(calm.backward(0.5, -kPath + 10'000.0), Verdict::kJumped);
+  Verdict last = Verdict::kNothing;
+  for (int i = 0; i < 6 && last != Verdict::kJumped; ++i) {
+    const double offset = -10'000.0;
+    last = calm.forward(0.5, kPath + offset);
+    if (last != Verdict::kJumped) last = calm.backward(0.5, -kPath + offset);
+  }
+  EXPECT_EQ(last, Verdict::kJumped);
+  EXPECT_NEAR(calm.watch().estimate().x, -10'000.0, 150.0);
+  EXPECT_NEAR(calm.watch().estimate().d, kPath, 150.0);
+}
+
 TEST(JumpWatch, forgets_an_outlier) {
   Calm calm;
   (void)calm.forward(0.5, kPath + 100'000.0);

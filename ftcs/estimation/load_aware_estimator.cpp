@@ -88,16 +88,16 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // One that was begun since a direction came late, and a message of the other is early: the clock
   // has changed.
   if (early && floor_.just_begun()) floor_.unlock();
-  if (floor_.never_seen() && contest_ > 0.0) floor_.unlock();
+  if (floor_.never_seen() && contest_ > 0.0 && lead() < kBeyondDoubt) floor_.unlock();
   // What the first picture explains alone and is late for the floor may have waited, for a whole
   // frame, or fragment, at a time: no end of a floor that is seen as often as before, nor, for a
-  // vague picture, of one that one direction sees so while the other waits through a burst. Noise
-  // far smaller than the floor's is none of a floor. One that is not believed does no harm; if it
-  // looks for a jump it is left to.
+  // picture that knows next to nothing, of one that one direction sees so while the other waits
+  // through a burst. Noise far smaller than the floor's is none of a floor. One that is not
+  // believed does no harm; if it looks for a jump it is left to.
   const bool young = !floor_.proven() || floor_.surmised();
   const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : kCertain;
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
-  const bool one_way = vague && floor_.seen_one_way();
+  const bool one_way = kFarLarger * floor_.scale() < noise && floor_.seen_one_way();
   const bool unseen = dry && !one_way && (believed_ || !floor_.seeks_jump());
   const bool ended = early && !vague;
   const bool disproven = ended || finer || unseen || (believed_ && young);

@@ -98,12 +98,15 @@ Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcep
   return seen;
 }
 
-/// Keeps the offset states so small that a double resolves them to well below a nanosecond.
+/// Keeps the offset states so small that a double resolves them to well below a nanosecond. What is
+/// known no better than that loses nothing if the messages are kept so small in its place.
 template <class Grid>
-void BasicAdaptiveServo<Grid>::rebase() noexcept {
+void BasicAdaptiveServo<Grid>::rebase(double z) noexcept {
   const double x = estimator_.estimate().x;
-  if (std::abs(x) < kLargestOffsetNs) return;
-  const Duration shift = Duration::from_ns(x);
+  if (std::max(std::abs(x), std::abs(z)) < kLargestOffsetNs) return;
+  const double far = estimator_.offset_sigma_ns(0.0) > kLargestOffsetNs ? z : x;
+  if (std::abs(far) < kLargestOffsetNs) return;
+  const Duration shift = Duration::from_ns(far);
   base_ += shift;
   estimator_.shift_offset(-shift.ns());
 }
@@ -122,12 +125,14 @@ ServoUpdate BasicAdaptiveServo<Grid>::update(const TimestampPair& pair,
   const double longer = meter_.observe(pair);
   if (longer != 1.0) estimator_.rescale_time(longer);
   estimator_.expect_noise_of_at_least(ticks_.rounding_ns());
-  double credit = estimator_.update(observe(pair));
+  Observation seen = observe(pair);
+  double credit = estimator_.update(seen);
   if (estimator_.count() == 0) {  // it has given up: this message is the first
     started_ = false;
-    credit = estimator_.update(observe(pair));
+    seen = observe(pair);
+    credit = estimator_.update(seen);
   }
-  rebase();
+  rebase(seen.z);
   ServoUpdate result;
   if (ready()) result = steer(now);
   result.verdict = credit < 0.5 ? SampleVerdict::kRejected : SampleVerdict::kUsed;

@@ -98,7 +98,7 @@ class BasicAdaptiveServo {
   using Estimator = std::conditional_t<Grid::kFollowsFloor, estimation::LoadAwareEstimator<Grid>,
                                        estimation::Estimator<Grid>>;
   void forget() noexcept;
-  void rebase() noexcept;
+  void rebase(double z) noexcept;
   [[nodiscard]] estimation::Observation observe(const TimestampPair& pair) noexcept;
   [[nodiscard]] bool ready() const noexcept;
   struct Belief {
