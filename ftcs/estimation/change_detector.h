@@ -19,6 +19,7 @@ struct ChangeTrust {
                              ///< message shows
   bool one_suffices = true;  ///< one message without a second that says the same
   bool seconded = true;      ///< there is such a second
+  double least = 0.0;        ///< nats, needed in any case
 };
 
 /// Cumulative sums (Page, Biometrika 41, 1954) of log-likelihood ratios between
@@ -93,7 +94,7 @@ class ChangeDetector {
     const double enough = (alone ? kConvincing : kThreshold) * caution;
     // What one message hints at must be followed at once; what has gathered over many is more often
     // chance, and costs a calm model all that it knew.
-    const double needed = abrupt ? enough : std::max(enough, kSure);
+    const double needed = std::max(abrupt ? enough : std::max(enough, kSure), trust.least);
     if (sum(i, winner) <= static_cast<float>(needed)) return {};
     for (std::size_t j = std::min(first_of(i), kLast); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
     return {winner, alone};

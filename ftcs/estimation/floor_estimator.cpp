@@ -157,11 +157,15 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   if (waits && early_ == 0) return;
   double sharp = kSharp * mean_wait_;
   if (early_ > 0) sharp = std::min(sharp, static_cast<double>(early_by_));
+  // Where early outliers are usual one of them comes beside a message that waited by as much.
+  const double early_part =
+      std::max(paths_.forward.early_outliers(), paths_.backward.early_outliers());
+  const bool usual = early_part > 2.0 * kSeldom;  // more than one lately
+  const ChangeTrust trust{early_ > 0, false, true, usual ? kSure : 0.0};
   for (std::uint32_t left = overtaken; left != 0; left &= left - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const std::size_t source =
-        detector_.take_over(i, static_cast<double>(count_), in.log_density, {early_ > 0, false})
-            .source;
+        detector_.take_over(i, static_cast<double>(count_), in.log_density, trust).source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
     if (waits && !shows_in_early(bank_.estimate(source))) continue;
     // A model so wild that it takes waits for the floor, or does not believe the message that was
@@ -255,13 +259,12 @@ void FloorEstimator::mix() noexcept {
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
   if (!locked_) return {};
-  // A floor with far more noise in one direction than in the other may be made of short waits
-  // there, beside long ones of the other: a finer one is looked for on.
-  const double ahead = noise_ns(Direction::kForward);
-  const double back = noise_ns(Direction::kBackward);
+  const double ahead = std::max(least_noise_, noise_ns(Direction::kForward));
+  const double back = std::max(least_noise_, noise_ns(Direction::kBackward));
   const bool uneven = kMuch * std::min(ahead, back) < std::max(ahead, back);
   return {true,
-          found_ && !uneven,
+          found_,
+          uneven,
           mixed_.x,
           scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
           mixed_.y,

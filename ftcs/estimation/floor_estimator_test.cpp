@@ -5,6 +5,7 @@
 #include "ftcs/estimation/floor_estimator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <random>
 
@@ -19,6 +20,7 @@ constexpr double kPath = 10e3;   // ns
 struct Waits {
   double share = 0.0;  ///< at the floor
   double mean = 0.0;   ///< ns
+  double early = 0.0;  ///< share of early outliers
 };
 
 class World {
@@ -29,9 +31,12 @@ class World {
       const Waits& of = waits_[direction];
       const bool waits = uniform_(random_) > of.share;
       const double wait = waits ? 2.0 * of.mean * uniform_(random_) : 0.0;
-      const double delay = kPath + kNoise * normal_(random_) + wait;
-      (void)floor.update({sign_of(direction), 0.5, sign_of(direction) * delay}, 0.0);
+      const double early = uniform_(random_) < of.early ? 300.0 : 0.0;
+      hear(floor, direction, kNoise * normal_(random_) + wait - early);
     }
+  }
+  static void hear(FloorEstimator& floor, Direction direction, double late) {
+    (void)floor.update({sign_of(direction), 0.5, sign_of(direction) * (kPath + late)}, 0.0);
   }
 
  private:
@@ -60,8 +65,8 @@ TEST(FloorEstimator, a_dozen_messages_do_not_tell_that_there_is_hardly_any_noise
   EXPECT_GT(least, kNoise / 8.0);
 }
 
-// Waits of 700 ns beside those of 100 us: taken for the noise of a floor for good in 28 of 40 runs
-// while candidates were judged by one mean wait of both directions.
+// Waits of 700 ns beside those of 100 us are taken for the noise of a floor at first: for good in
+// 22 of 40 runs while no finer one was looked for.
 TEST(FloorEstimator, short_waits_beside_long_ones_do_not_stay_noise) {
   int coarse = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -69,9 +74,27 @@ TEST(FloorEstimator, short_waits_beside_long_ones_do_not_stay_noise) {
     FloorEstimator floor;
     floor.expect_noise_of_at_least(0.4);
     for (int k = 0; k < 1500; ++k) world.cycle(floor);
+    ASSERT_TRUE(floor.locked());
     coarse += floor.noise_ns(Direction::kBackward) > 2.0 * kNoise ? 1 : 0;
   }
-  EXPECT_EQ(coarse, 0);
+  EXPECT_LE(coarse, 2);
+}
+
+// An outlier in one direction, and what waits by as much in the other, look like a jump of the
+// clock: 600 ns in 4 of 60 runs when two such messages were enough.
+TEST(FloorEstimator, two_messages_show_no_jump_where_early_ones_are_usual) {
+  double furthest = 0.0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    World world(seed, {{0.5, 60e3, 0.01}, {1.0, 0.0, 0.01}});
+    FloorEstimator floor;
+    floor.expect_noise_of_at_least(0.4);
+    for (int k = 0; k < 4800; ++k) {
+      world.cycle(floor);
+      if (k > 1200) furthest = std::max(furthest, std::abs(floor.estimate().x));
+    }
+    ASSERT_TRUE(floor.locked());
+  }
+  EXPECT_LT(furthest, 100.0);
 }
 
 }  // namespace

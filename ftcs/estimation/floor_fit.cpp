@@ -102,13 +102,9 @@ class Fit {
     }
   }
 
+  /// Octaves above `smallest_`, the first for all below.
   static constexpr int kOctaves = 48;
-  /// Of the messages of one direction above its line.
-  struct Heights {
-    /// By octaves above `smallest_`, the first for all below.
-    std::array<std::uint16_t, kOctaves> count{};
-    double sum = 0.0;  ///< ns
-  };
+  using Counts = std::array<std::uint16_t, kOctaves>;
 
   [[nodiscard]] int octave_of(double height) const noexcept {
     if (!(height > smallest_)) return 0;
@@ -119,7 +115,7 @@ class Fit {
   void try_rate(double rate) noexcept {
     Candidate candidate;
     candidate.rate = rate;
-    PerDirection<Heights> heights{};
+    Counts count{};
     for (const Direction direction : kDirections) {
       const RecordWindow& window = windows_[direction];
       double least = 1e300;
@@ -128,59 +124,47 @@ class Fit {
         least = std::min(least, height(direction, m, rate, window.time(m)));
       }
       candidate.floor[direction] = least;
-      Heights& of = heights[direction];
+      double sum = 0.0;
       for (std::size_t k = 0; k < window.size; ++k) {
         const RecordedMessage& m = window[k];
         const double above = height(direction, m, rate, window.time(m)) - least;
-        of.sum += above;
-        ++of.count[static_cast<std::size_t>(octave_of(above))];
+        sum += above;
+        ++count[static_cast<std::size_t>(octave_of(above))];
       }
-      candidate.mean += of.sum / total_;
-      candidate.highest = std::max(candidate.highest, of.sum / static_cast<double>(window.size));
+      candidate.mean += sum / total_;
+      candidate.highest = std::max(candidate.highest, sum / static_cast<double>(window.size));
     }
-    score(heights, candidate);
+    score(count, candidate);
     if (candidate.score > best_.score) best_ = candidate;
   }
 
-  /// ln likelihood of the best width: `inside` messages evenly within it, the others of each
-  /// direction log-uniform or exponential, whichever is likelier. (With one mean wait of both a
-  /// width that holds all that one direction waits is better than none of its waits told.)
-  void score(const PerDirection<Heights>& heights, Candidate& candidate) const noexcept {
+  /// ln likelihood of the best width: `inside` messages evenly within it, the
+  /// others log-uniform or exponential, whichever is likelier.
+  void score(const Counts& count, Candidate& candidate) const noexcept {
     const double log_unit = quick_log(kLogRange * smallest_);
     const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
       return -((static_cast<double>(octave) - 0.5) * std::numbers::ln2 + log_unit);
     };
-    PerDirection<double> beyond{};
-    PerDirection<double> late{};  // messages
-    for (const Direction direction : kDirections) {
-      late[direction] = static_cast<double>(windows_[direction].size);
-      for (int b = 1; b < kOctaves; ++b) {
-        beyond[direction] += heights[direction].count[static_cast<std::size_t>(b)] * unknown(b);
-      }
-    }
+    double beyond = 0.0;
+    for (int b = 1; b < kOctaves; ++b) beyond += count[static_cast<std::size_t>(b)] * unknown(b);
     double inside = 0.0;
     double width = smallest_;
     for (int b = 0; b < kOctaves; ++b) {
-      if (b > 0) width *= 2.0;
-      double here = 0.0;
-      for (const Direction direction : kDirections) {
-        const double own = heights[direction].count[static_cast<std::size_t>(b)];
-        here += own;
-        late[direction] -= own;
-        if (b > 0) beyond[direction] -= own * unknown(b);
-      }
+      const double here = count[static_cast<std::size_t>(b)];
       inside += here;
+      if (b > 0) {
+        beyond -= here * unknown(b);
+        width *= 2.0;
+      }
       if (inside < kRepeated || here == 0.0) continue;
       if (width > kSmallPart * candidate.highest && b > 1) break;
-      double likelihood = inside * quick_log(inside / (total_ * width));
-      for (const Direction direction : kDirections) {
-        if (!(late[direction] > 0.0)) continue;
-        const double mean = std::max(heights[direction].sum / late[direction], smallest_);
-        const double exponential = -late[direction] * (quick_log(mean) + 1.0);
-        likelihood += std::max(beyond[direction], exponential);
-      }
       const double rest = total_ - inside;
-      if (rest > 0.0) likelihood += rest * quick_log(rest / total_);
+      double likelihood = inside * quick_log(inside / (total_ * width));
+      if (rest > 0.0) {
+        const double mean = candidate.mean * total_ / rest;
+        const double exponential = -rest * (quick_log(mean) + 1.0);
+        likelihood += rest * quick_log(rest / total_) + std::max(beyond, exponential);
+      }
       if (likelihood > candidate.score) {
         candidate.score = likelihood;
         candidate.width = width;

@@ -54,7 +54,7 @@ struct FloorFit {
 ///    and Towsley, INFOCOM 1999).
 /// 2. For each, the messages' heights above both touching lines, by octaves:
 ///    the best likelihood of a share that lies evenly within a width, and waits
-///    of each direction beyond it.
+///    beyond it.
 /// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line,
 ///    sigma, shares and one mean wait of both directions under FloorNoise, from the best candidate.
 /// 4. A mean wait for each direction, where they differ beyond chance: ports of 1 Gbit/s and 100

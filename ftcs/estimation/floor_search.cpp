@@ -100,7 +100,10 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
     has_rate_ = scan_has_rate_ = true;
   }
   clear_ = clear_ || (fit.clear(Direction::kForward) && fit.clear(Direction::kBackward));
-  if (!fit.found || fit.evidence < kConvincing) return;
+  // That there is a floor has been told, by a search or by a path that was settled, where a finer
+  // one is looked for.
+  const bool finer = rival.uneven && fit.sigma() < rival.noise;
+  if (!fit.found || (fit.evidence < kConvincing && !finer)) return;
   const double sigma = fit.offset_sigma_ns();
   if (rival.there) {  // it must explain more, and lie elsewhere or know more
     const double own = rival.offset_sigma * rival.offset_sigma;
@@ -120,7 +123,8 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
 bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
   if (wanted_ == 0) {
     const bool in_doubt = rival.there && alarm_;
-    const bool asked = !rival.found && messages_ % kShortestPause == 0 && messages_ >= not_before_;
+    const bool asked = (!rival.found || rival.uneven) && messages_ % kShortestPause == 0 &&
+                       messages_ >= not_before_;
     if (!in_doubt && !asked) return false;
     begin();
   }
@@ -141,7 +145,7 @@ void FloorSearch::end(const Rival& rival) noexcept {
   alarm_ = false;
   if (best_wanted_ > 0) return;
   const auto stride = static_cast<double>(record_.stride());
-  if (!rival.found) {  // asked again after twice as long, or when something is late
+  if (!rival.found || rival.uneven) {  // asked again after twice as long, or when something is late
     pause_ = std::min(2U * pause_, kLongestPause);
     if (messages_ > kLongestPause) not_before_ = messages_ + pause_;
   }

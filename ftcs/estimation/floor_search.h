@@ -27,9 +27,12 @@ class FloorSearch {
   /// must be.
   struct Rival {
     bool there = false;
-    /// By a search, or by lucky messages, and of one noise: another is looked for after an alarm
-    /// alone. Otherwise it is looked for on.
+    /// By a search, or by lucky messages: another is looked for after an alarm
+    /// alone. A floor that was only begun is looked for on.
     bool found = false;
+    /// It has far more noise in one direction, which may be short waits beside long ones of the
+    /// other: a finer one is looked for on.
+    bool uneven = false;
     double offset = 0.0;           ///< ns, at the last message
     double offset_sigma = 0.0;     ///< ns
     double rate = 0.0;             ///< ns per cycle

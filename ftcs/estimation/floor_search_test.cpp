@@ -57,7 +57,7 @@ bool finds_another(FloorSearch::Rival rival, bool alarm) {
 }
 
 TEST(FloorSearch, a_floor_that_was_only_begun_does_not_end_the_search) {
-  FloorSearch::Rival rival{true, false, 10e3, 500.0, 0.0, 20.0, {0.3, 0.3}};
+  FloorSearch::Rival rival{true, false, false, 10e3, 500.0, 0.0, 20.0, {0.3, 0.3}};
   EXPECT_TRUE(finds_another(rival, false));
   rival.found = true;
   EXPECT_FALSE(finds_another(rival, false));

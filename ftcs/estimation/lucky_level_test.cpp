@@ -35,7 +35,7 @@ struct World {
   }
 };
 
-TEST(LuckyLevel, is_found_in_either_direction_after_eight_and_once_the_other_is_clear) {
+TEST(LuckyLevel, is_found_in_either_direction_once_the_other_is_clear) {
   EXPECT_EQ((World{20, 0}.found_after(2'000)), 180);
   EXPECT_EQ((World{0, 20}.found_after(2'000)), 180);
   EXPECT_GT((World{40, 0}.found_after(2'000)), 240);

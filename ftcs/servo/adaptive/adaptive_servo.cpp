@@ -98,8 +98,9 @@ Observation BasicAdaptiveServo<Grid>::observe(const TimestampPair& pair) noexcep
   return seen;
 }
 
-/// Keeps the offset states so small that a double resolves them to well below a nanosecond. What is
-/// known no better than that loses nothing if the messages are kept so small in its place.
+/// Keeps the offset states so small that a double resolves them to well below a nanosecond. An
+/// offset that is known to 18 minutes at best loses nothing if the message is kept so small
+/// instead.
 template <class Grid>
 void BasicAdaptiveServo<Grid>::rebase(double z) noexcept {
   const double x = estimator_.estimate().x;
