@@ -102,7 +102,7 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
   clear_ = clear_ || (fit.clear(Direction::kForward) && fit.clear(Direction::kBackward));
   // That there is a floor has been told, by a search or by a path that was settled, where a finer
   // one is looked for.
-  const bool finer = rival.uneven && fit.sigma() < rival.noise;
+  const bool finer = rival.uneven && kMuch * fit.sigma() < rival.noise;
   if (!fit.found || (fit.evidence < kConvincing && !finer)) return;
   const double sigma = fit.offset_sigma_ns();
   if (rival.there) {  // it must explain more, and lie elsewhere or know more
