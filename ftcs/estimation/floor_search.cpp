@@ -18,6 +18,9 @@ constexpr std::size_t kMostStride = FloorSearch::Record::kCapacity / 2;
 /// holds two of them.
 constexpr double kFineAbove = 2.0;
 
+/// Another floor is looked for without an alarm.
+bool sought(const FloorSearch::Rival& rival) noexcept { return !rival.found || rival.uneven; }
+
 }  // namespace
 
 void FloorSearch::restart() noexcept {
@@ -123,8 +126,7 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
 bool FloorSearch::look(const Rival& rival, double least_noise) noexcept {
   if (wanted_ == 0) {
     const bool in_doubt = rival.there && alarm_;
-    const bool asked = (!rival.found || rival.uneven) && messages_ % kShortestPause == 0 &&
-                       messages_ >= not_before_;
+    const bool asked = sought(rival) && messages_ % kShortestPause == 0 && messages_ >= not_before_;
     if (!in_doubt && !asked) return false;
     begin();
   }
@@ -145,7 +147,7 @@ void FloorSearch::end(const Rival& rival) noexcept {
   alarm_ = false;
   if (best_wanted_ > 0) return;
   const auto stride = static_cast<double>(record_.stride());
-  if (!rival.found || rival.uneven) {  // asked again after twice as long, or when something is late
+  if (sought(rival)) {  // asked again after twice as long, or when something is late
     pause_ = std::min(2U * pause_, kLongestPause);
     if (messages_ > kLongestPause) not_before_ = messages_ + pause_;
   }
