@@ -152,6 +152,7 @@ class Estimator {
   void mix() noexcept;
   void follow_scale() noexcept;
   void adopt_shapes() noexcept;
+  void doubt_delay() noexcept;
   void seek_second_opinion(const Observation& seen, double innovation) noexcept;
   void begin_anew(const Estimate& start) noexcept;
   void start_again(const FreshFit& fit) noexcept;

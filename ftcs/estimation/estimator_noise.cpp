@@ -145,6 +145,25 @@ void Estimator<Grid>::adopt_shapes() noexcept {
     if (!seen_[side]) continue;
     shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};
   }
+  if (two_way() && delay_free()) doubt_delay();
+}
+
+/// Of n messages whose noise has the deviation r, x + sign d is known to r / sqrt(n) at best
+/// (Cramer and Rao's bound), and the delay to half of that, however well the other direction is
+/// known. Filters that took both for one size of noise at first believe more, in the direction that
+/// leaves the quieter one's x + sign d as it is.
+template <class Grid>
+void Estimator<Grid>::doubt_delay() noexcept {
+  const std::size_t noisy = shape_[0].variance > shape_[1].variance ? 0 : 1;
+  const double messages = static_cast<double>(count_) / 2.0;
+  const double least = shape_[noisy].variance / (4.0 * messages);
+  const double sign = sign_of(1 - noisy);
+  bank_.for_each([=](Estimate& e) {
+    const double lacking = std::max(0.0, least - e.dd);
+    e.xx += lacking;
+    e.xd -= sign * lacking;
+    e.dd += lacking;
+  });
 }
 
 /// Exponential mean of nu^2 / S of the best model. What is taken for an outlier
@@ -203,6 +222,7 @@ double Estimator<Grid>::noise_ns(Direction direction) const noexcept {
 template void Estimator<FullGrid>::mix() noexcept;
 template void Estimator<FullGrid>::follow_scale() noexcept;
 template void Estimator<FullGrid>::adopt_shapes() noexcept;
+template void Estimator<FullGrid>::doubt_delay() noexcept;
 template void Estimator<FullGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
 template double Estimator<FullGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<FullGrid>::rate_sigma_ns() const noexcept;
@@ -211,6 +231,7 @@ template double Estimator<FullGrid>::noise_ns(Direction) const noexcept;
 template void Estimator<SmallGrid>::mix() noexcept;
 template void Estimator<SmallGrid>::follow_scale() noexcept;
 template void Estimator<SmallGrid>::adopt_shapes() noexcept;
+template void Estimator<SmallGrid>::doubt_delay() noexcept;
 template void Estimator<SmallGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
 template double Estimator<SmallGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<SmallGrid>::rate_sigma_ns() const noexcept;

@@ -113,6 +113,33 @@ TEST(Estimator, a_second_direction_separates_offset_and_delay) {
   EXPECT_NEAR(estimator.estimate().d, 700.0, 20.0);
 }
 
+// Stamps of hardware one way, of software the other. Of n noisy messages the delay, and with it the
+// offset, is known to half of their deviation / sqrt(n): what was believed while both seemed to
+// have one size of noise must not keep it from that, nor from saying so.
+TEST(Estimator, noise_a_thousand_times_larger_in_one_direction_leaves_the_offset_near_its_bound) {
+  constexpr int kMessages = 3000;
+  constexpr int kRuns = 40;
+  constexpr double kNoisy = 10'000.0;
+  const double bound = kNoisy / 2.0 / std::sqrt(kMessages / 2.0);
+  double squares = 0.0;
+  int within_three_sigma = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(run) + 1);
+    std::normal_distribution<double> normal;
+    Estimator<FullGrid> estimator;
+    for (int n = 0; n < kMessages; ++n) {
+      const double sign = n % 2 == 0 ? 1.0 : -1.0;
+      const double noise = sign > 0.0 ? 10.0 : kNoisy;
+      (void)estimator.update({sign, 0.5, 1e6 + sign * (100'000.0 + noise * normal(random))});
+    }
+    const double error = std::abs(estimator.estimate().x - 1e6);
+    squares += error * error;
+    within_three_sigma += error < 3.0 * estimator.offset_sigma_ns(0.0) ? 1 : 0;
+  }
+  EXPECT_LE(std::sqrt(squares / kRuns), 1.5 * bound) << "bound " << bound;
+  EXPECT_GE(within_three_sigma, kRuns - 2);
+}
+
 TEST(Estimator, the_first_message_of_the_second_direction_sets_the_delay_free_however_late) {
   for (const int before : {2, 5, 20}) {
     Estimator<FullGrid> estimator;

@@ -99,6 +99,8 @@ class FloorEstimator {
   [[nodiscard]] bool seeks_jump() const noexcept {
     return jumps_.judge(kConvincing) == JumpWatch::Verdict::kWait;
   }
+  /// And it is the offset that has, which makes one direction early.
+  [[nodiscard]] bool seeks_offset() const noexcept { return jumps_.seeks_offset(); }
   /// ln of the density p above that the last message had, 1/ns.
   [[nodiscard]] double log_density() const noexcept { return said_; }
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -81,6 +82,10 @@ class JumpWatch {
   /// `rival`: nats by which a change of rate explains better than none.
   [[nodiscard]] Verdict judge(double rival) const noexcept;
   [[nodiscard]] Estimate estimate() const noexcept { return leading().estimate(); }
+  /// A jump of the offset explains best what is seen.
+  [[nodiscard]] bool seeks_offset() const noexcept {
+    return offset_.alive() && offset_.lead() > std::max(0.0, delay_.lead());
+  }
   void clear() noexcept;
 
  private:

@@ -80,7 +80,10 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
-  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
+  // Where they differ by no more than a vague picture may it is open whether they do: the contest
+  // waits.
+  const double open = noise < soon ? std::max(0.0, contest_ - kHint) : 0.0;
+  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : open;
   // An early message did not wait. A vague picture may lead while the floor finds by how much the
   // clock has jumped, which that does better; a sharp one ends it.
   const bool early = own < 0.5 && !floor_.testimony().late;
@@ -224,7 +227,10 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     // More that wait would open the gate of the first picture.
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
-  if (followed && floor_.locked()) follow_lead(direction_of(seen));
+  if (followed && floor_.locked()) {
+    const bool explains = own < 0.5 && credit > 0.5 && !floor_.seeks_offset();
+    follow_lead(direction_of(seen), explains);
+  }
   if (floor_.locked() && (lead() <= -kMost || impossible())) floor_.unlock();
   const bool convinces = believed_ || agreed || lead() > kBelieved;
   believed_ =
@@ -232,13 +238,17 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
   return believed_ ? believed_credit(own) : credit;
 }
 
+/// What is early for the floor did not wait: that the first picture `explains` it alone speaks
+/// against the floor, and not merely for nothing. (Unless the offset may have jumped: that makes
+/// one direction early.)
 template <class Grid>
-void LoadAwareEstimator<Grid>::follow_lead(Direction direction) noexcept {
+void LoadAwareEstimator<Grid>::follow_lead(Direction direction, bool explains) noexcept {
   const FloorEstimator::Testimony& said = floor_.testimony();
   const double plain = quick_exp(std::max(plain_.log_density(), kLeastExponent));
   double& part = learnt_part_[direction];
   const double learnt = part * said.waiting;
-  const double waits = learnt + (1.0 - part) * plain;
+  const bool early = explains && !said.late;
+  const double waits = early ? said.waiting : learnt + (1.0 - part) * plain;
   const auto follow = [&](double& lead, double share) {
     const double density = share * said.at_floor + (1.0 - share) * waits;
     const double gained = std::clamp(quick_log(density / plain), -kConvincing, kConvincing);
@@ -247,6 +257,7 @@ void LoadAwareEstimator<Grid>::follow_lead(Direction direction) noexcept {
   };
   const double waited = follow(lead_, said.share);
   (void)follow(recent_lead_, said.recent_share);
+  if (early) return;
   part += (waited * learnt / waits - part * waited) / kLately;
   part = std::clamp(part, kNowAndThen, 1.0 - kNowAndThen);
 }

@@ -24,8 +24,9 @@ namespace ftcs::estimation {
 /// second, q the part of the waits that the learnt T explains better than p
 /// does: whether there is a floor where the second picture says is tested
 /// *beside* whatever the first predicts, so that the shapes of tails do not
-/// decide. w by a long and by a short memory, the better one: a load that
-/// changes must not cost the floor.
+/// decide. A message that is early for the floor, and none of the first picture's outliers, has
+/// its outliers for T and nothing of p beside them: no wait makes a message early. w by a long and
+/// by a short memory, the better one: a load that changes must not cost the floor.
 ///
 /// To the outside it is an Estimator, with the same functions and units; which
 /// picture answers is told by follows_floor() (decision 0020).
@@ -96,7 +97,7 @@ class LoadAwareEstimator {
   void compare(double credit, double own, bool anew) noexcept;
   void doubt_floor() noexcept;
   [[nodiscard]] bool welcome() noexcept;
-  void follow_lead(Direction direction) noexcept;
+  void follow_lead(Direction direction, bool explains) noexcept;
   [[nodiscard]] double lead() const noexcept { return std::max(lead_, recent_lead_); }
 
   Estimator<Grid> plain_;
