@@ -354,6 +354,10 @@ template <class Grid>
 void Estimator<Grid>::choose() noexcept {
   if (count_ > kFew && evidence_.messages() > 0.0) {
     best_ = evidence_.weigh(weight_);
+    // A reference that is still finding its own time, say: which model saw the least of that says
+    // nothing of the clock. (Heavy tails have half as much at times.)
+    const double most = count_ < kLoadMemory ? kMuch : 2.0 * kMuch;
+    if (evidence_.mean_square(best_) > most * scale_ * scale_) evidence_.fade();
     return;
   }
   weight_.fill(0.0);
