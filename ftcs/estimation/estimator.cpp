@@ -354,11 +354,14 @@ template <class Grid>
 void Estimator<Grid>::choose() noexcept {
   if (count_ > kFew && evidence_.messages() > 0.0) {
     best_ = evidence_.weigh(weight_);
-    // A reference that is still finding its own time, say: which model saw the least of that says
-    // nothing of the clock. (Heavy tails have half as much at times.)
-    const double most = count_ < kLoadMemory ? kMuch : 2.0 * kMuch;
-    if (evidence_.mean_square(best_) > most * scale_ * scale_) evidence_.fade();
-    return;
+    wild_ = best_ >= Grid::kSudden ? static_cast<std::uint8_t>(wild_ + 1) : 0;
+    if (wild_ < kOutlierMemory) return;
+    // The wildest follow each message. Where one of them is believed for so long the calmer ones
+    // may have lost the clock (to a reference that was finding its own time, say): they take all
+    // that comes for outliers, and would for good. All begin where it is.
+    wild_ = 0;
+    bank_.start(bank_.estimate(best_));
+    evidence_.forget();
   }
   weight_.fill(0.0);
   best_ = Grid::kStart;

@@ -172,6 +172,7 @@ class Estimator {
   std::array<NoiseLearner<Grid::kNoiseWindow>, 2> learner_{};
   std::array<DelayShape, 2> shape_{};
   std::array<bool, 2> seen_{};
+  std::uint8_t wild_ = 0;  ///< messages in a row with one of the wildest models believed
   Gate gate_{};
   SortedWindow<Grid::kResidualWindow> residuals_{};
   SecondOpinion<Grid::kOpinionWindow> second_opinion_{};

@@ -145,13 +145,13 @@ void Estimator<Grid>::adopt_shapes() noexcept {
     if (!seen_[side]) continue;
     shape_[side] = {in_ns[side].variance / (scale_ * scale_), in_ns[side].tail / scale_};
   }
-  if (two_way() && delay_free()) doubt_delay();
+  if (delay_free()) doubt_delay();
 }
 
-/// Of n messages whose noise has the deviation r, x + sign d is known to r / sqrt(n) at best
-/// (Cramer and Rao's bound), and the delay to half of that, however well the other direction is
-/// known. Filters that took both for one size of noise at first believe more, in the direction that
-/// leaves the quieter one's x + sign d as it is.
+/// Of n messages (half of all) whose noise, waits apart, has the deviation r, x + sign d is known
+/// to r / sqrt(n) at best (Cramer and Rao's bound), and the delay to half of that, however well the
+/// other direction is known. Filters that took both for one size of noise at first believe more, in
+/// the direction that leaves the quieter one's x + sign d as it is.
 template <class Grid>
 void Estimator<Grid>::doubt_delay() noexcept {
   const std::size_t noisy = shape_[0].variance > shape_[1].variance ? 0 : 1;

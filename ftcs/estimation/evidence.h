@@ -37,11 +37,8 @@ class Evidence {
       store(&logs_[i], load<V>(&logs_[i]) + credit * (load<V>(&log_variance[i]) - log_s2));
     }
     messages_ += credit;
-    if (messages_ > kLongestMemory) shrink(kLongestMemory / messages_);
+    if (messages_ > kLongestMemory) shrink();
   }
-  /// Half of it is forgotten: V in it is of a noise that is over, and would outweigh all that
-  /// follows.
-  void fade() noexcept { shrink(0.5); }
   void forget() noexcept { *this = Evidence{}; }
   /// What another bank has heard of the same models, which stand there at
   /// places[i].
@@ -119,8 +116,9 @@ class Evidence {
     const double share = 1.0 / sum;
     for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);
   }
-  void shrink(double keep) noexcept {
-    messages_ *= keep;
+  void shrink() noexcept {
+    const double keep = kLongestMemory / messages_;
+    messages_ = kLongestMemory;
     for (std::size_t i = 0; i < kSize; i += kStep) {
       store(&squares_[i], load<V>(&squares_[i]) * keep);
       store(&logs_[i], load<V>(&logs_[i]) * keep);

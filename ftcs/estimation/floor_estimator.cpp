@@ -58,12 +58,14 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
       path.share,
       path.recent_share,
       late,
-      late && std::min(path.share, path.recent_share) < kNearlyAll};
+      late && std::min(path.share, path.recent_share) < kNearlyAll,
+      false};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
                             : (1.0 - credit) * quick_exp(std::max(said_, kLeastExponent));
   const double s2 = scale_ * scale_;
   gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];
   watch_jumps(seen, path, in);
+  testimony_.offset_jump = jumps_.seeks_offset();
   bank_.correct(seen, scale_, in);
   if (!bank_.healthy() && !bank_.heal(best_)) {
     locked_ = false;

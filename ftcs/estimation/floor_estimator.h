@@ -36,7 +36,8 @@ class FloorEstimator {
     double share = 0.5;     ///< of messages at the floor in its direction, by a long memory
     double recent_share = 0.5;
     bool late = false;
-    bool waited = false;  ///< late, where waiting is usual
+    bool waited = false;       ///< late, where waiting is usual
+    bool offset_jump = false;  ///< a jump of the offset explains it, and those before, better
   };
 
   /// No floor, and nothing recorded.
@@ -99,8 +100,6 @@ class FloorEstimator {
   [[nodiscard]] bool seeks_jump() const noexcept {
     return jumps_.judge(kConvincing) == JumpWatch::Verdict::kWait;
   }
-  /// And it is the offset that has, which makes one direction early.
-  [[nodiscard]] bool seeks_offset() const noexcept { return jumps_.seeks_offset(); }
   /// ln of the density p above that the last message had, 1/ns.
   [[nodiscard]] double log_density() const noexcept { return said_; }
   [[nodiscard]] const Testimony& testimony() const noexcept { return testimony_; }

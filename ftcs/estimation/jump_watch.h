@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -82,9 +81,10 @@ class JumpWatch {
   /// `rival`: nats by which a change of rate explains better than none.
   [[nodiscard]] Verdict judge(double rival) const noexcept;
   [[nodiscard]] Estimate estimate() const noexcept { return leading().estimate(); }
-  /// A jump of the offset explains best what is seen.
+  /// A jump of the offset explains what is seen better than none, and no worse than one of the
+  /// delay.
   [[nodiscard]] bool seeks_offset() const noexcept {
-    return offset_.alive() && offset_.lead() > std::max(0.0, delay_.lead());
+    return offset_.alive() && offset_.lead() > 0.0 && &leading() == &offset_;
   }
   void clear() noexcept;
 

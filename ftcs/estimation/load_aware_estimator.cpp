@@ -80,10 +80,10 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
   const double gain = std::clamp(better, -kConvincing, kConvincing);
-  // Where they differ by no more than a vague picture may it is open whether they do: the contest
-  // waits.
-  const double open = noise < soon ? std::max(0.0, contest_ - kHint) : 0.0;
-  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : open;
+  // Where they differ by no more than a vague picture may it is open whether they do: what was
+  // gathered is lost little by little.
+  const double kept = noise < soon ? std::max(0.0, contest_ - kHint) : 0.0;
+  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : kept;
   // An early message did not wait. A vague picture may lead while the floor finds by how much the
   // clock has jumped, which that does better; a sharp one ends it.
   const bool early = own < 0.5 && !floor_.testimony().late;
@@ -228,7 +228,8 @@ double LoadAwareEstimator<Grid>::update(const Observation& seen) noexcept {
     agreed = credit < 0.5 && floor_.proven() && floor_.testimony().waited && agree();
   }
   if (followed && floor_.locked()) {
-    const bool explains = own < 0.5 && credit > 0.5 && !floor_.seeks_offset();
+    const bool jumped = floor_.adopted() || floor_.testimony().offset_jump;
+    const bool explains = own < 0.5 && credit > 0.5 && !jumped;
     follow_lead(direction_of(seen), explains);
   }
   if (floor_.locked() && (lead() <= -kMost || impossible())) floor_.unlock();
@@ -248,9 +249,9 @@ void LoadAwareEstimator<Grid>::follow_lead(Direction direction, bool explains) n
   double& part = learnt_part_[direction];
   const double learnt = part * said.waiting;
   const bool early = explains && !said.late;
-  const double waits = early ? said.waiting : learnt + (1.0 - part) * plain;
+  const double waits = learnt + (1.0 - part) * plain;
   const auto follow = [&](double& lead, double share) {
-    const double density = share * said.at_floor + (1.0 - share) * waits;
+    const double density = share * said.at_floor + (early ? said.waiting : (1.0 - share) * waits);
     const double gained = std::clamp(quick_log(density / plain), -kConvincing, kConvincing);
     lead = std::clamp(lead + gained, -kMost, kMost);
     return (1.0 - share) * waits / density;  // probability that it waited
