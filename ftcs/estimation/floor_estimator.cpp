@@ -222,7 +222,7 @@ double FloorEstimator::heard() const noexcept {
   return std::min(paths_.forward.heard, paths_.backward.heard);
 }
 
-bool FloorEstimator::surmised() const noexcept { return heard() < kSurmised; }
+bool FloorEstimator::young() const noexcept { return surmised() || (found_ && !proven()); }
 
 bool FloorEstimator::never_seen() const noexcept {
   return found_ && !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;

@@ -75,11 +75,10 @@ class FloorEstimator {
   [[nodiscard]] bool found() const noexcept { return found_; }
   /// It was found, and messages of both directions have been seen there since.
   [[nodiscard]] bool proven() const noexcept;
-  /// Too few messages have been heard since it was begun to tell waits from a path that has
-  /// changed.
-  [[nodiscard]] bool surmised() const noexcept;
-  /// Or to tell it from one that is seen for good.
+  /// Too few messages have been heard since it was begun to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
+  /// Found and not proven, or too few for what is taken for waits to be no path that has changed.
+  [[nodiscard]] bool young() const noexcept;
   /// Begun, not found, and surmised.
   [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
   /// It was found, and no message of either direction has been seen there since: 14 nats each.
@@ -150,6 +149,8 @@ class FloorEstimator {
 
   /// Messages since it was begun, of the direction that has fewer.
   [[nodiscard]] double heard() const noexcept;
+  /// Too few to tell waits from a path that has changed.
+  [[nodiscard]] bool surmised() const noexcept { return heard() < kSurmised; }
   double follow(const Observation& seen) noexcept;
   [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;

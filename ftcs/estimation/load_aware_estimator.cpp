@@ -79,7 +79,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
       floor_.found() && !floor_.early_lately() ? std::max(apart, apart_ns(kFew)) : apart;
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
-  const double gain = std::clamp(better, -kConvincing, kConvincing);
+  // A message that is where both say tells their noise apart, not them.
+  const bool tells = finer || std::min(credit, own) < 0.5;
+  const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
   // Where they differ by no more than a vague picture may it is open whether they do: what was
   // gathered is lost little by little.
   const double kept = noise < soon ? std::max(0.0, contest_ - kHint) : 0.0;
@@ -97,8 +99,11 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // picture that knows next to nothing, of one that one direction sees so while the other waits
   // through a burst. Noise far smaller than the floor's is none of a floor. One that is not
   // believed does no harm; if it looks for a jump it is left to.
-  const bool young = !floor_.proven() || floor_.surmised();
-  const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : kCertain;
+  const bool young = floor_.young();
+  // In a burst one that waits foretells the next: a picture lost among the waits leads by chance.
+  const bool lost_in_burst = !young && noise > kSharp * floor_.mean_wait() && lead() > kCertain;
+  const double usual = lost_in_burst ? kBeyondDoubt : kCertain;
+  const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : usual;
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
   const bool one_way = kFarLarger * floor_.scale() < noise && floor_.seen_one_way();
   const bool unseen = dry && !one_way && (believed_ || !floor_.seeks_jump());
@@ -250,10 +255,15 @@ void LoadAwareEstimator<Grid>::follow_lead(Direction direction, bool explains) n
   const double learnt = part * said.waiting;
   const bool early = explains && !said.late;
   const double waits = learnt + (1.0 - part) * plain;
+  // Both say the same, the first one sharply beside the waits: to believe the floor costs nothing,
+  // and what the next burst does to the first picture is not followed.
+  const bool harmless =
+      believed_ && together_ && kFarLarger * plain_noise_ns() < floor_.mean_wait();
+  const double least = harmless ? 0.0 : -kMost;
   const auto follow = [&](double& lead, double share) {
     const double density = share * said.at_floor + (early ? said.waiting : (1.0 - share) * waits);
     const double gained = std::clamp(quick_log(density / plain), -kConvincing, kConvincing);
-    lead = std::clamp(lead + gained, -kMost, kMost);
+    lead = std::clamp(lead + gained, std::min(lead, least), kMost);
     return (1.0 - share) * waits / density;  // probability that it waited
   };
   const double waited = follow(lead_, said.share);
