@@ -72,6 +72,13 @@ struct ClockState {
     dd = dd - hd * hd * shrink;
   }
 
+  /// The delay is less well known by `variance`, and the offset with it: x + sign d stays as it is.
+  void doubt_delay(double sign, double variance) noexcept {
+    xx = xx + variance;
+    xd = xd - sign * variance;
+    dd = dd + variance;
+  }
+
   /// The unit of time becomes `factor` times as long.
   void rescale_time(double factor) noexcept {
     y = y * factor;

@@ -98,11 +98,7 @@ void Estimator<Grid>::connect_second_direction(std::size_t side) noexcept {
 template <class Grid>
 void Estimator<Grid>::unpin_delay(double first_sign, double variance) noexcept {
   pinned_ = false;
-  bank_.for_each([=](Estimate& e) {
-    e.xx += variance;
-    e.xd -= first_sign * variance;
-    e.dd += variance;
-  });
+  bank_.for_each([=](Estimate& e) { e.doubt_delay(first_sign, variance); });
 }
 
 /// With so much doubt a first message that is late by more is an outlier; with

@@ -43,13 +43,6 @@ bool alike(double variance, double other) noexcept {
   return std::max(variance, other) < kMuch * std::min(variance, other);
 }
 
-/// The delay is less well known by `variance`, and the offset with it: x + sign d stays as it is.
-void doubt_delay_beside(double sign, double variance, Estimate& e) noexcept {
-  e.xx += variance;
-  e.xd -= sign * variance;
-  e.dd += variance;
-}
-
 /// Geometric mean of the standard deviations of one or both directions, of the
 /// product of their variances.
 double common_deviation(double variances, int sides) noexcept {
@@ -138,7 +131,7 @@ void Estimator<Grid>::adopt_shapes() noexcept {
       if (delay_free) {
         e.d -= shift / 2.0;
         e.x -= sign * shift / 2.0;
-        doubt_delay_beside(-sign, doubt, e);
+        e.doubt_delay(-sign, doubt);
       } else {
         e.x -= sign * shift;
         e.xx += doubt;
@@ -164,7 +157,7 @@ void Estimator<Grid>::doubt_delay() noexcept {
   const double messages = static_cast<double>(count_) / 2.0;
   const double least = shape_[noisy].variance / (4.0 * messages);
   const double sign = sign_of(1 - noisy);
-  bank_.for_each([=](Estimate& e) { doubt_delay_beside(sign, std::max(0.0, least - e.dd), e); });
+  bank_.for_each([=](Estimate& e) { e.doubt_delay(sign, std::max(0.0, least - e.dd)); });
 }
 
 /// Exponential mean of nu^2 / S of the best model. What is taken for an outlier

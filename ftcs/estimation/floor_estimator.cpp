@@ -131,6 +131,41 @@ bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
   return dry(kSure) || 2.0 * static_cast<double>(early_by_) > std::abs(jump);
 }
 
+/// One that takes the last one back before that was confirmed: both directions have a lower floor.
+/// Where waits are whole fragments, one that is early here and one that waited for one more
+/// fragment there look like a jump.
+Estimate FloorEstimator::after_jump() noexcept {
+  Estimate after = jumps_.estimate();
+  const double jump = after.x - bank_.estimate(best_).x;
+  const double size = std::abs(jump);
+  const bool undone = std::abs(jump + static_cast<double>(jumped_)) < kSharp * size;
+  const bool both_lower = undone && size < kMuch * mean_wait_;
+  jumped_ = both_lower ? 0.0F : static_cast<float>(jump);
+  if (both_lower) {
+    after.x -= jump / 2.0;
+    after.d -= size / 2.0;
+  }
+  return after;
+}
+
+/// The clock has changed, it seems.
+void FloorEstimator::expect_confirmation() noexcept {
+  for (const Direction each : kDirections) {
+    paths_[each].unseen = static_cast<std::uint8_t>(kSurmised);
+  }
+}
+
+/// A message was at the floor. Once so many of each direction have confirmed a change, what was
+/// heard before it is void: a window across it has the earliest of one direction from before, and
+/// of the other from after it.
+void FloorEstimator::confirm(Path& path) noexcept {
+  if (path.unseen == 0) return;
+  --path.unseen;
+  if (paths_.forward.unseen + paths_.backward.unseen > 0) return;
+  jumped_ = 0.0F;
+  search_.restart();
+}
+
 void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const bool early = in.centred[best_] < 0.0;
   if (early && in.distance[best_] > kThreeSigma) {
@@ -145,11 +180,12 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const bool shows = jump == JumpWatch::Verdict::kJumped && shows_in_early(jumps_.estimate());
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (shows) {
-    bank_.start(jumps_.estimate());
+    bank_.start(after_jump());
     for (const Direction each : kDirections) paths_[each].early = 0.0F;  // they said so
     detector_.clear();
     jumps_.clear();
     search_.alarm();
+    expect_confirmation();
     return;
   }
   if (jump == JumpWatch::Verdict::kWait) return;
@@ -157,8 +193,6 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   // was early showed as much.
   const bool waits = !early && in.credit[best_] < kUnlikely;
   if (waits && early_ == 0) return;
-  double sharp = kSharp * mean_wait_;
-  if (early_ > 0) sharp = std::min(sharp, static_cast<double>(early_by_));
   // Where early outliers are usual one of them comes beside a message that waited by as much.
   const double early_part =
       std::max(paths_.forward.early_outliers(), paths_.backward.early_outliers());
@@ -170,9 +204,10 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
         detector_.take_over(i, static_cast<double>(count_), in.log_density, trust).source;
     if (source == ChangeDetector<FloorGrid>::kNone) continue;
     if (waits && !shows_in_early(bank_.estimate(source))) continue;
-    // A model so wild that it takes waits for the floor, or does not believe the message that was
-    // early, knows nothing better.
-    if (scale_ * std::sqrt(bank_.estimate(source).xx) > sharp) continue;
+    // A model so wild that it takes waits for the floor knows nothing better.
+    if (scale_ * std::sqrt(bank_.estimate(source).xx) > kSharp * mean_wait_) continue;
+    const double moved = bank_.estimate(source).x - bank_.estimate(i).x;
+    if (i == best_ && moved * moved > kEightSigma * scale_ * scale_) expect_confirmation();
     bank_.set(i, bank_.estimate(source));
   }
 }
@@ -194,6 +229,7 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
     path.variance += credit / std::min(path.members, kLongMemory) * (square - path.variance);
   }
   learn_early(path, nu, credit);
+  if (credit > 0.5) confirm(path);
   if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
   path.there = credit >= kUnlikely;
   if (!path.there && path.dry == 0.0) other.there = false;
@@ -215,7 +251,7 @@ void FloorEstimator::learn_early(Path& path, double nu, double credit) noexcept 
 }
 
 bool FloorEstimator::proven() const noexcept {
-  return found_ && std::min(paths_.forward.members, paths_.backward.members) > kProven;
+  return std::min(paths_.forward.members, paths_.backward.members) > kProven;
 }
 
 double FloorEstimator::heard() const noexcept {

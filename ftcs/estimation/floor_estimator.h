@@ -71,9 +71,7 @@ class FloorEstimator {
   /// Messages wait, as others see it.
   void wake() noexcept { search_.wake(); }
 
-  /// By the search, and not begun from what was believed without it.
-  [[nodiscard]] bool found() const noexcept { return found_; }
-  /// It was found, and messages of both directions have been seen there since.
+  /// Messages of both directions have been seen there, those that the fit was made of included.
   [[nodiscard]] bool proven() const noexcept;
   /// Too few messages have been heard since it was begun to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
@@ -133,10 +131,11 @@ class FloorEstimator {
     double variance = 1.0;      ///< r^2, ns^2
     double members = 0.0;       ///< messages at the floor behind the variance
     double heard = 0.0;
-    double dry = 0.0;      ///< nats: how unlikely it is that none of the last was at
-                           ///< the floor
-    bool there = false;    ///< the last one was, and since the other direction is dry
-    bool pending = false;  ///< an early one that later ones have not explained
+    double dry = 0.0;         ///< nats: how unlikely it is that none of the last was at
+                              ///< the floor
+    std::uint8_t unseen = 0;  ///< messages at the floor until a change is confirmed
+    bool there = false;       ///< the last one was, and since the other direction is dry
+    bool pending = false;     ///< an early one that later ones have not explained
     WaitDensity waits{};
     float early = 0.0F;      ///< share of early outliers, learnt
     float mean_wait = 0.0F;  ///< ns, when the floor was found
@@ -155,6 +154,9 @@ class FloorEstimator {
   [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;
   [[nodiscard]] bool shows_in_early(const Estimate& after) const noexcept;
+  [[nodiscard]] Estimate after_jump() noexcept;
+  void expect_confirmation() noexcept;
+  void confirm(Path& path) noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
   void learn(Path& path, Path& other, const Bank::Innovations& in) noexcept;
   static void learn_early(Path& path, double nu, double credit) noexcept;
@@ -184,9 +186,10 @@ class FloorEstimator {
   double gain_ = 1.0;
   double said_ = 0.0;       ///< ln density of the last message
   double mean_wait_ = 0.0;  ///< ns, when the floor was found
-  bool found_ = false;      ///< by a fit or by lucky messages, not begun where a path was settled
   int early_ = 0;           ///< messages for which an early one is remembered
   float early_by_ = 0.0F;   ///< ns, of the earliest that is remembered
+  float jumped_ = 0.0F;     ///< ns, by the last jump of the offset, until it is confirmed
+  bool found_ = false;      ///< by a fit or by lucky messages, not begun where a path was settled
   bool locked_ = false;
   bool adopted_ = false;
 };

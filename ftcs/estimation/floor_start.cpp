@@ -30,7 +30,7 @@ void FloorEstimator::begin(double scale, double wait) noexcept {
   weight_[best_] = 1.0;
   count_ = kLately;
   early_ = 0;
-  early_by_ = 0.0F;
+  early_by_ = jumped_ = 0.0F;
   locked_ = adopted_ = true;
 }
 
@@ -40,6 +40,7 @@ void FloorEstimator::begin_path(Path& path, double share, double members, double
   path.members = members;
   path.heard = path.dry = 0.0;
   path.there = path.pending = false;
+  path.unseen = 0;
   path.mean_wait = static_cast<float>(wait);
   path.waits.start(wait);
 }

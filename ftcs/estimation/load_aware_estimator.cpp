@@ -73,10 +73,8 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool vague = noise > kMuch * floor_.scale();
   const double apart = apart_ns();
   together_ = apart < noise;
-  // Lines that are about to part do. (One that was begun is where the first picture was; one that
-  // is finding a change of the clock is heard first.)
-  const double soon =
-      floor_.found() && !floor_.early_lately() ? std::max(apart, apart_ns(kFew)) : apart;
+  // Lines that are about to part do. (One that is finding a change of the clock is heard first.)
+  const double soon = floor_.early_lately() ? apart : std::max(apart, apart_ns(kFew));
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
   const double better = plain_.log_density() - floor_.log_density();
   // A message that is where both say tells their noise apart, not them.
@@ -179,7 +177,7 @@ bool LoadAwareEstimator<Grid>::finds_lucky(Direction direction, double credit) n
   }
   const double noise = plain_.noise_ns(direction);
   lucky_.observe(direction, credit > 0.5, -plain_.innovation_ns(), noise);
-  if (floor_.locked() || !lucky_.found(direction, noise)) return false;
+  if (floor_.locked() || !lucky_.found(direction)) return false;
   if (!start_floor(lucky_.ns(direction))) return false;
   floor_.lower(direction, lucky_.ns(direction), lucky_.share(direction));
   lead_ = recent_lead_ = kCertain;

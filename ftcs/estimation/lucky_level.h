@@ -41,11 +41,9 @@ class LuckyLevel {
   }
   /// This direction has a level (with one outlier in 300, all of one size, six come together by
   /// chance in 4 runs of 1,000, eight in none), reached by few of its messages (else the path has
-  /// changed), and the other has none: so many have come without one that it is no chance. By less
-  /// than eight times the `noise`, ns, the early tail of what is believed may be alike by chance.
-  [[nodiscard]] bool found(Direction direction, double noise) const noexcept {
+  /// changed), and the other has none: so many have come without one that it is no chance.
+  [[nodiscard]] bool found(Direction direction) const noexcept {
     const Side& own = sides_[direction];
-    if (!(ns(direction) * ns(direction) > kEightSigma * noise * noise)) return false;
     const double missing = share(direction) * sides_[opposite(direction)].without;
     return own.seen >= kLately && 2 * own.seen < own.since && missing > kConvincing;
   }

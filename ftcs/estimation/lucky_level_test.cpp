@@ -28,8 +28,7 @@ struct World {
         const bool lucky = every > 0 && i % every == 0;
         level.observe(direction, !lucky, lucky ? kLucky + normal(random) : normal(random), kNoise);
       }
-      if (level.found(Direction::kForward, kNoise) || level.found(Direction::kBackward, kNoise))
-        return i;
+      if (level.found(Direction::kForward) || level.found(Direction::kBackward)) return i;
     }
     return 0;
   }
@@ -63,7 +62,7 @@ TEST(LuckyLevel, outliers_of_one_size_that_come_close_together_by_chance_are_non
       for (const Direction direction : kDirections) {
         const bool early = outlier(random);
         level.observe(direction, !early, early ? 1600.0 : 0.0, kNoise);
-        here = here || level.found(direction, kNoise);
+        here = here || level.found(direction);
       }
     }
     found += here ? 1 : 0;
@@ -100,16 +99,10 @@ LuckyLevel one_in_twenty() {
   return level;
 }
 
-TEST(LuckyLevel, within_the_early_tail_of_what_is_believed_is_none) {
-  const LuckyLevel level = one_in_twenty();
-  EXPECT_TRUE(level.found(Direction::kBackward, kLucky / 9.0));
-  EXPECT_FALSE(level.found(Direction::kBackward, kLucky / 7.0));
-}
-
 TEST(LuckyLevel, tells_where_it_is_and_how_many_reach_it) {
   const LuckyLevel level = one_in_twenty();
-  ASSERT_TRUE(level.found(Direction::kBackward, kNoise));
-  EXPECT_FALSE(level.found(Direction::kForward, kNoise));
+  ASSERT_TRUE(level.found(Direction::kBackward));
+  EXPECT_FALSE(level.found(Direction::kForward));
   EXPECT_NEAR(level.ns(Direction::kBackward), kLucky, 0.01);
   EXPECT_NEAR(level.share(Direction::kBackward), 0.05, 0.01);
 }
