@@ -139,9 +139,8 @@ Estimate FloorEstimator::after_jump() noexcept {
   const double jump = after.x - bank_.estimate(best_).x;
   const double size = std::abs(jump);
   const bool undone = std::abs(jump + static_cast<double>(jumped_)) < kSharp * size;
-  const bool both_lower = undone && size < kMuch * mean_wait_;
-  jumped_ = both_lower ? 0.0F : static_cast<float>(jump);
-  if (both_lower) {
+  jumped_ = undone ? 0.0F : static_cast<float>(jump);
+  if (undone) {
     after.x -= jump / 2.0;
     after.d -= size / 2.0;
   }
