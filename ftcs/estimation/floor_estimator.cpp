@@ -257,7 +257,7 @@ double FloorEstimator::heard() const noexcept {
   return std::min(paths_.forward.heard, paths_.backward.heard);
 }
 
-bool FloorEstimator::young() const noexcept { return surmised() || (found_ && !proven()); }
+bool FloorEstimator::young() const noexcept { return surmised() || !proven(); }
 
 bool FloorEstimator::never_seen() const noexcept {
   return found_ && !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;

@@ -75,7 +75,7 @@ class FloorEstimator {
   [[nodiscard]] bool proven() const noexcept;
   /// Too few messages have been heard since it was begun to tell it from one that is seen for good.
   [[nodiscard]] bool recent() const noexcept;
-  /// Found and not proven, or too few for what is taken for waits to be no path that has changed.
+  /// Not proven, or too few for what is taken for waits to be no path that has changed.
   [[nodiscard]] bool young() const noexcept;
   /// Begun, not found, and surmised.
   [[nodiscard]] bool just_begun() const noexcept { return !found_ && surmised(); }
