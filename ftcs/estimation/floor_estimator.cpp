@@ -260,7 +260,7 @@ double FloorEstimator::heard() const noexcept {
 bool FloorEstimator::young() const noexcept { return surmised() || !proven(); }
 
 bool FloorEstimator::never_seen() const noexcept {
-  return found_ && !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;
+  return !proven() && std::min(paths_.forward.dry, paths_.backward.dry) > kSure;
 }
 
 bool FloorEstimator::seen_one_way() const noexcept {
