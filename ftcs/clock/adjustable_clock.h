@@ -58,6 +58,10 @@ class AdjustableClock {
   /// only if correction_time is above zero, but must be finite all the same.
   [[nodiscard]] virtual Result<ClockReading, ClockError> apply(
       const ServoCommand& command) noexcept = 0;
+  /// The most by which corrections have lately ended late; not below zero. A clock that ends them
+  /// in its own arithmetic or hardware is never late, one that a process has to end is as late as
+  /// that process is woken.
+  [[nodiscard]] virtual Duration expiry_lateness() const noexcept { return {}; }
 
  protected:
   AdjustableClock() = default;

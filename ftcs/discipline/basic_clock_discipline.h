@@ -58,6 +58,7 @@ struct ServoTraits {
 ///     offset     beyond largest_offset, and no step permitted: not acted on, the rate is kept
 ///     step       |offset| > threshold and permitted: step = -offset, at the tracking rate, unless
 ///                the servo decides steps; permitted otherwise: as the servo asks; else none
+///     length     the clock ends corrections late: the same one, over a longer time (late_expiry.h)
 ///     rate       |change| <= largest_rate_change, at the command and at the end of its correction
 ///     limits     slowest <= rate <= fastest, of servo and clock together
 ///     clock      apply(), which refuses what is not a number or infinite (kNotFinite); on its

@@ -8,6 +8,7 @@
 
 #include "ftcs/clock/command_check.h"
 #include "ftcs/discipline/basic_clock_discipline.h"
+#include "ftcs/discipline/late_expiry.h"
 
 namespace ftcs {
 
@@ -241,6 +242,7 @@ ServoCommand BasicClockDiscipline<Servo>::with_step(ServoCommand command,
 template <ClockServo Servo>
 ServoCommand BasicClockDiscipline<Servo>::within_limits(ServoCommand command) noexcept {
   if (!is_finite(command)) return command;  // no limit makes it one: the clock refuses it
+  command = stretched(command, clock_.expiry_lateness());
   rate_change_.begin(clock_, telemetry_.reading.free_running);
   command = rate_change_.limited(command, telemetry_.reading.free_running);
   command.tracking_rate = limits_.clamp(command.tracking_rate);

@@ -353,7 +353,7 @@ void KernelClock::place_change(const ClockDevice::Reading& after, double doubt_n
 // On an error the correction goes on; the next command, or a reading a little later, tries again.
 // Before our rate replaces another one, whoever set that is noticed.
 void KernelClock::end_correction() noexcept {
-  end_.reset();
+  note_lateness(latest_.free_running - *std::exchange(end_, std::nullopt));
   check_rate();
   const auto error = change_rate(tracking_rate_, Duration{});
   if (!error) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -43,6 +44,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] RateLimits rate_limits() const noexcept override { return limits_; }
   [[nodiscard]] Result<ClockReading, ClockError> apply(
       const ServoCommand& command) noexcept override;
+  [[nodiscard]] Duration expiry_lateness() const noexcept override { return lateness_; }
   [[nodiscard]] FreeRunningTime now() noexcept override { return read().free_running; }
 
   /// A timestamp that was taken from this clock, on its free-running face. No value: it is older
@@ -136,6 +138,12 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] Result<Rate, ClockError> command(Rate rate, Duration step) noexcept;
   void place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept;
   void end_correction() noexcept;
+  // The greatest of the last corrections', forgotten by a sixteenth with each of them.
+  void note_lateness(Duration late) noexcept {
+    constexpr double kKept = 15.0 / 16.0;
+    lateness_ = std::max({Duration{}, late, Duration::from_ns(kKept * lateness_.ns())});
+  }
+
   ClockDevice device_;
   RateLimits limits_;
   bool may_steer_;
@@ -159,6 +167,7 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   } anchor_{};
   std::int64_t trusted_since_ns_;         // older stamps belong to before somebody's step
   std::optional<FreeRunningTime> end_{};  // of the running correction
+  Duration lateness_{};
   Rate tracking_rate_{};
   // CLOCK_REALTIME against RAW differs from the commanded rate by the rounding of the kernel's
   // multipliers; measured over at least a second at a time.

@@ -202,5 +202,27 @@ TEST_P(KernelClockPreemptionTest, a_busy_minute_holds_no_step_and_the_free_face_
   }
 }
 
+// Whoever is kept from ending corrections in time says by how much, and forgets it when all is
+// well.
+TEST_P(KernelClockPreemptionTest, says_how_late_corrections_have_lately_ended) {
+  KernelClock clock = make();
+  const auto correct_and_end = [&](double late_ns) {
+    ASSERT_TRUE(clock.apply(correct(5.0, 15 * kMillisecond, 0.0)).ok());
+    kernel.run(static_cast<double>(*clock.wait_for_expiry_ns()) + late_ns);
+    (void)clock.read();
+    ASSERT_FALSE(clock.expiry().has_value());
+  };
+  EXPECT_EQ(clock.expiry_lateness(), Duration{});
+  correct_and_end(9 * kMillisecond);
+  EXPECT_NEAR(clock.expiry_lateness().ns(), 9 * kMillisecond, 0.01 * kMillisecond);
+  correct_and_end(2 * kMillisecond);
+  EXPECT_NEAR(clock.expiry_lateness().ns(), 9 * 15.0 / 16.0 * kMillisecond, 0.01 * kMillisecond);
+  for (int i = 0; i < 150; ++i) correct_and_end(0.01 * kMillisecond);
+  EXPECT_LT(clock.expiry_lateness().ns(), 0.02 * kMillisecond);
+  ASSERT_TRUE(clock.apply(correct(5.0, 15 * kMillisecond, 0.0)).ok());
+  clock.settle();  // before its time: not late at all
+  EXPECT_GE(clock.expiry_lateness(), Duration{});
+}
+
 }  // namespace
 }  // namespace ftcs::platform
