@@ -17,8 +17,10 @@ namespace ftcs {
 ///
 ///     T_c' = min(max(T_c, 4 L), 8 T_c),        a_c' = a_t + (a_c - a_t) T_c / T_c'
 ///
-/// (a_c, a_t: correction and tracking rate), which removes the same offset: at most a quarter of it
-/// is left. Eight T_c of the adaptive servo are its interval: by then another command has come.
+/// (a_c, a_t: correction and tracking rate), which removes the same offset: a quarter of it at most
+/// is left, unless that is more than eight T_c. Eight T_c of the adaptive servo are its interval:
+/// by then another command has come. A rate or a time that the actuator does not have is rounded by
+/// it; what that leaves is the next command's.
 ///
 /// `lateness`: AdjustableClock::expiry_lateness(). A command without a correction is left as it is.
 [[nodiscard]] inline ServoCommand stretched(ServoCommand command, Duration lateness) noexcept {

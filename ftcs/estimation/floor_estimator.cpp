@@ -17,6 +17,11 @@ double log_normal(double distance, double log_variance) noexcept {
   return -0.5 * (distance + log_variance + kLn2Pi);
 }
 
+/// Of a mean, 1/ns.
+double exponential(double wait, double mean) noexcept {
+  return quick_exp(std::max(-wait / mean, kLeastExponent)) / mean;
+}
+
 }  // namespace
 
 void FloorEstimator::restart() noexcept {
@@ -59,9 +64,14 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
       path.recent_share,
       late,
       late && std::min(path.share, path.recent_share) < kNearlyAll,
-      false};
+      false,
+      0.0F};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
                             : (1.0 - credit) * quick_exp(std::max(said_, kLeastExponent));
+  if (late) {
+    const double mean = std::max(scale_, static_cast<double>(path.late_by));
+    testimony_.like_last = static_cast<float>(exponential(in.centred[best_], mean));
+  }
   const double s2 = scale_ * scale_;
   gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];
   watch_jumps(seen, path, in);
@@ -133,12 +143,14 @@ bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
 
 /// One that takes the last one back before that was confirmed: both directions have a lower floor.
 /// Where waits are whole fragments, one that is early here and one that waited for one more
-/// fragment there look like a jump.
+/// fragment there look like a jump. (Not if messages would arrive there before they were sent: that
+/// clock was put back.)
 Estimate FloorEstimator::after_jump() noexcept {
   Estimate after = jumps_.estimate();
   const double jump = after.x - bank_.estimate(best_).x;
   const double size = std::abs(jump);
-  const bool undone = std::abs(jump + static_cast<double>(jumped_)) < kSharp * size;
+  const bool possible = after.d - size / 2.0 > -early_arrival();
+  const bool undone = possible && std::abs(jump + static_cast<double>(jumped_)) < kSharp * size;
   jumped_ = undone ? 0.0F : static_cast<float>(jump);
   if (undone) {
     after.x -= jump / 2.0;
@@ -230,10 +242,20 @@ void FloorEstimator::learn(Path& path, Path& other, const Bank::Innovations& in)
   learn_early(path, nu, credit);
   if (credit > 0.5) confirm(path);
   if (nu > 0.0 && credit < 0.99) path.waits.learn(nu, 1.0 - credit);
-  path.there = credit >= kUnlikely;
-  if (!path.there && path.dry == 0.0) other.there = false;
-  path.dry = path.there ? 0.0 : path.dry - quick_log(1.0 - path.share);
+  const auto waited = static_cast<float>(std::max(0.0, nu) * (1.0 - credit));
+  path.late_by += (waited - path.late_by) / static_cast<float>(kFew);
+  learn_dry(path, other, credit);
   if (path.dry > kSure) search_.alarm();
+}
+
+/// While none of a direction has been at a floor that was found its share falls, as one over those
+/// that were heard: the fit's own is asked, or it would never be dry.
+void FloorEstimator::learn_dry(Path& path, Path& other, double credit) noexcept {
+  path.there = credit >= kUnlikely;
+  if (credit > 0.5) path.told = 0.0F;
+  if (!path.there && path.dry == 0.0) other.there = false;
+  const double share = std::max(path.share, static_cast<double>(path.told));
+  path.dry = path.there ? 0.0 : path.dry - quick_log(1.0 - share);
 }
 
 /// Early by next to nothing beside the waits, and those after it are where they were. What is early
@@ -305,6 +327,7 @@ FloorSearch::Rival FloorEstimator::rival() const noexcept {
           mixed_.x,
           scale_ * std::sqrt(std::max(0.0, mixed_.xx)),
           mixed_.y,
+          mixed_.d > 0.0 ? -early_arrival() : FloorSearch::Rival{}.least_delay,
           scale_,
           {paths_.forward.share, paths_.backward.share}};
 }

@@ -38,6 +38,7 @@ class FloorEstimator {
     bool late = false;
     bool waited = false;       ///< late, where waiting is usual
     bool offset_jump = false;  ///< a jump of the offset explains it, and those before, better
+    float like_last = 0.0F;    ///< density of one that waits as the last few did, 1/ns
   };
 
   /// No floor, and nothing recorded.
@@ -139,6 +140,8 @@ class FloorEstimator {
     WaitDensity waits{};
     float early = 0.0F;      ///< share of early outliers, learnt
     float mean_wait = 0.0F;  ///< ns, when the floor was found
+    float late_by = 0.0F;    ///< ns, the mean of the last few
+    float told = 0.0F;       ///< w, by the fit, until a message is seen at the floor
 
     /// Probability of an early outlier.
     [[nodiscard]] double early_outliers() const noexcept {
@@ -148,6 +151,9 @@ class FloorEstimator {
 
   /// Messages since it was begun, of the direction that has fewer.
   [[nodiscard]] double heard() const noexcept;
+  /// By how much messages may seem to arrive before they were sent: latencies of stamps that nobody
+  /// calibrated, small beside the waits. ns.
+  [[nodiscard]] double early_arrival() const noexcept { return mean_wait_ / kFarLarger; }
   /// Too few to tell waits from a path that has changed.
   [[nodiscard]] bool surmised() const noexcept { return heard() < kSurmised; }
   double follow(const Observation& seen) noexcept;
@@ -159,6 +165,7 @@ class FloorEstimator {
   void confirm(Path& path) noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
   void learn(Path& path, Path& other, const Bank::Innovations& in) noexcept;
+  static void learn_dry(Path& path, Path& other, double credit) noexcept;
   static void learn_early(Path& path, double nu, double credit) noexcept;
   void choose() noexcept;
   void mix() noexcept;

@@ -115,7 +115,10 @@ void FloorSearch::fit_window(const Rival& rival, double least_noise) noexcept {
         off * off > kFiveSigma2 * (own + sigma * sigma) || own > kFiveSigma2 * sigma * sigma;
     // Where the load has grown, entries that waited are taken for a floor of much noise.
     const bool blurred = fit.sigma() > kMuch * rival.noise;
-    if (fit.log_likelihood - fit.said < kCertain || !contradicts || blurred) return;
+    // The earliest of one direction from before a step, those of the other from after it.
+    const bool too_early = fit.estimate.d < rival.least_delay;
+    const bool better = fit.log_likelihood - fit.said >= kCertain;
+    if (!better || !contradicts || blurred || too_early) return;
   }
   if (best_wanted_ > 0 && best_.offset_sigma_ns() <= sigma) return;
   best_ = fit;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "ftcs/estimation/floor_fit.h"
 #include "ftcs/estimation/floor_record.h"
@@ -33,9 +34,11 @@ class FloorSearch {
     /// It has far more noise in one direction, which may be short waits beside long ones of the
     /// other: a finer one is looked for on.
     bool uneven = false;
-    double offset = 0.0;           ///< ns, at the last message
-    double offset_sigma = 0.0;     ///< ns
-    double rate = 0.0;             ///< ns per cycle
+    double offset = 0.0;        ///< ns, at the last message
+    double offset_sigma = 0.0;  ///< ns
+    double rate = 0.0;          ///< ns per cycle
+    /// ns; what was always below zero, by stamps that nobody calibrated, may be anything.
+    double least_delay = std::numeric_limits<double>::lowest();
     double noise = 0.0;            ///< ns, of one message
     PerDirection<double> share{};  ///< of messages at the floor, learnt
   };

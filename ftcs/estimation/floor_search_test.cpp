@@ -39,7 +39,7 @@ TEST(FloorSearch, a_rate_that_has_changed_is_no_floor_where_one_direction_speaks
 }
 
 /// Whether the floor is found beside a line that is followed already.
-bool finds_another(FloorSearch::Rival rival, bool alarm) {
+bool finds_another(FloorSearch::Rival rival, bool alarm, double floor_ns = 10e3) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0.0, 20.0);
   std::exponential_distribution<double> wait(1.0 / 15e3);
@@ -47,7 +47,7 @@ bool finds_another(FloorSearch::Rival rival, bool alarm) {
   FloorSearch search;
   for (std::size_t k = 0; k < 200; ++k) {
     for (const Direction direction : kDirections) {
-      const double delay = 10e3 + normal(random) + (waits(random) ? wait(random) : 0.0);
+      const double delay = floor_ns + normal(random) + (waits(random) ? wait(random) : 0.0);
       search.hear({direction, sign_of(direction) * delay, -12.0, false, 0.0}, 0.5);
       if (alarm) search.alarm();
       if (search.look(rival, 0.4)) return true;
@@ -57,11 +57,24 @@ bool finds_another(FloorSearch::Rival rival, bool alarm) {
 }
 
 TEST(FloorSearch, a_floor_that_was_only_begun_does_not_end_the_search) {
-  FloorSearch::Rival rival{true, false, false, 10e3, 500.0, 0.0, 20.0, {0.3, 0.3}};
+  FloorSearch::Rival rival{true, false, false, 10e3, 500.0, 0.0};
+  rival.noise = 20.0;
+  rival.share = {0.3, 0.3};
   EXPECT_TRUE(finds_another(rival, false));
   rival.found = true;
   EXPECT_FALSE(finds_another(rival, false));
   EXPECT_TRUE(finds_another(rival, true));
+}
+
+// What was recorded before a step and after it makes floors at which messages arrive before they
+// were sent.
+TEST(FloorSearch, a_delay_below_what_is_possible_is_no_floor) {
+  FloorSearch::Rival rival{true, true, false, 10e3, 500.0, 0.0, -1e3, 20.0, {0.3, 0.3}};
+  EXPECT_TRUE(finds_another(rival, true, 10e3));
+  EXPECT_TRUE(finds_another(rival, true, -0.9e3));
+  EXPECT_FALSE(finds_another(rival, true, -10e3));
+  rival.least_delay = FloorSearch::Rival{}.least_delay;  // it was below zero before
+  EXPECT_TRUE(finds_another(rival, true, -10e3));
 }
 
 }  // namespace

@@ -62,7 +62,8 @@ bool LoadAwareEstimator<Grid>::impossible() const noexcept {
 
 /// While the two contradict each other a contest is held: each predicts every message before it is
 /// heard, S = max(0, S + ln p1 - ln p2), nats, p1 and p2 the densities that it had by the first and
-/// by the floor and its waits (a cumulative sum, Page, Biometrika 41, 1954). A picture that is
+/// by the floor and its waits, or, in a burst, as long a wait as the last few, if that is greater
+/// (a cumulative sum, Page, Biometrika 41, 1954). A picture that is
 /// sharp by luck does not stay ahead; one that is right gains ten nats a message, since waits are
 /// predicted badly. `anew`: the first one has just begun again from a line through the last
 /// messages, which it explains; a hint.
@@ -76,7 +77,14 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // Lines that are about to part do. (One that is finding a change of the clock is heard first.)
   const double soon = floor_.early_lately() ? apart : std::max(apart, apart_ns(kFew));
   const bool contradicts = finer || (vague ? kMuch * noise : noise) < soon;
-  const double better = plain_.log_density() - floor_.log_density();
+  // In a burst one that waits foretells the next: a picture lost among the waits leads by chance.
+  const bool young = floor_.young();
+  const bool lost_in_burst = !young && noise > kSharp * floor_.mean_wait() && lead() > kCertain;
+  const auto like_last = static_cast<double>(floor_.testimony().like_last);
+  const double floor_says = lost_in_burst && like_last > 0.0
+                                ? std::max(floor_.log_density(), quick_log(like_last))
+                                : floor_.log_density();
+  const double better = plain_.log_density() - floor_says;
   // A message that is where both say tells their noise apart, not them.
   const bool tells = finer || std::min(credit, own) < 0.5;
   const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
@@ -97,10 +105,7 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // picture that knows next to nothing, of one that one direction sees so while the other waits
   // through a burst. Noise far smaller than the floor's is none of a floor. One that is not
   // believed does no harm; if it looks for a jump it is left to.
-  const bool young = floor_.young();
-  // In a burst one that waits foretells the next: a picture lost among the waits leads by chance.
-  const bool lost_in_burst = !young && noise > kSharp * floor_.mean_wait() && lead() > kCertain;
-  const double usual = lost_in_burst ? kBeyondDoubt : kCertain;
+  const double usual = lost_in_burst && lead() > kCertain ? kBeyondDoubt : kCertain;
   const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : usual;
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
   const bool one_way = kFarLarger * floor_.scale() < noise && floor_.seen_one_way();

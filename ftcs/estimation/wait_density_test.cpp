@@ -56,6 +56,20 @@ TEST(WaitDensity, is_finite_for_every_mean_that_it_holds_and_holds_none_that_it_
   EXPECT_FALSE(WaitDensity::holds(90e6));
 }
 
+// One wait in five hundred lies in each half octave beyond all that were seen.
+TEST(WaitDensity, a_wait_beyond_all_that_were_seen_may_be_of_any_size) {
+  WaitDensity waits;
+  waits.start(60e3);
+  std::mt19937_64 random(1);
+  std::exponential_distribution<double> wait(1.0 / 60e3);
+  for (int k = 0; k < 3000; ++k) waits.learn(wait(random), 1.0);
+  double beyond = 0.0;
+  for (double edge = 1e6; edge < 1.6e7; edge *= 1.01)
+    beyond += 0.01 * edge * waits.at(1.005 * edge);
+  EXPECT_GT(beyond, 0.01);
+  EXPECT_LT(beyond, 0.03);
+}
+
 TEST(WaitDensity, any_wait_is_possible) {
   WaitDensity waits;
   waits.start(1e3);

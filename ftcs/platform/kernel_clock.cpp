@@ -281,7 +281,7 @@ Result<ClockReading, ClockError> KernelClock::apply(const ServoCommand& command)
       change_rate(corrects ? command.correction_rate : command.tracking_rate, command.step);
   if (error) return *error;
   tracking_rate_ = command.tracking_rate;
-  end_.reset();
+  if (std::exchange(end_, std::nullopt)) note_lateness({});
   if (corrects) end_ = latest_.free_running + correction_length(command);
   return latest_;
 }

@@ -138,10 +138,14 @@ class KernelClock final : public AdjustableClock, public FreeRunningSource {
   [[nodiscard]] Result<Rate, ClockError> command(Rate rate, Duration step) noexcept;
   void place_change(const ClockDevice::Reading& after, double doubt_ns) noexcept;
   void end_correction() noexcept;
-  // The greatest of the last corrections', forgotten by a sixteenth with each of them.
+  // The greatest of the last corrections', forgotten by a sixteenth with each of them; also with
+  // those that a command replaced, or one that is made longer for it would never end and be asked.
+  // A machine that stood still for longer than a second says nothing of the next correction.
   void note_lateness(Duration late) noexcept {
     constexpr double kKept = 15.0 / 16.0;
-    lateness_ = std::max({Duration{}, late, Duration::from_ns(kKept * lateness_.ns())});
+    constexpr Duration kMost = Nanoseconds{1'000'000'000};
+    const Duration kept = Duration::from_ns(kKept * lateness_.ns());
+    lateness_ = std::max(std::min(late, kMost), kept);
   }
 
   ClockDevice device_;

@@ -219,9 +219,20 @@ TEST_P(KernelClockPreemptionTest, says_how_late_corrections_have_lately_ended) {
   EXPECT_NEAR(clock.expiry_lateness().ns(), 9 * 15.0 / 16.0 * kMillisecond, 0.01 * kMillisecond);
   for (int i = 0; i < 150; ++i) correct_and_end(0.01 * kMillisecond);
   EXPECT_LT(clock.expiry_lateness().ns(), 0.02 * kMillisecond);
+}
+
+// Or a correction that is made longer for it, up to the next command, would be so for good.
+TEST_P(KernelClockPreemptionTest, forgets_how_late_corrections_ended_while_commands_replace_them) {
+  KernelClock clock = make();
   ASSERT_TRUE(clock.apply(correct(5.0, 15 * kMillisecond, 0.0)).ok());
-  clock.settle();  // before its time: not late at all
-  EXPECT_GE(clock.expiry_lateness(), Duration{});
+  kernel.run(60 * kSecond);  // the machine slept, perhaps
+  (void)clock.read();
+  EXPECT_NEAR(clock.expiry_lateness().ns(), kSecond, 1.0);
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(clock.apply(correct(5.0, 125 * kMillisecond, 0.0)).ok());
+    kernel.run(100 * kMillisecond);
+  }
+  EXPECT_LT(clock.expiry_lateness().ns(), 2 * kMillisecond);
 }
 
 }  // namespace
