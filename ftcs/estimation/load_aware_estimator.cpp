@@ -61,11 +61,11 @@ bool LoadAwareEstimator<Grid>::impossible() const noexcept {
 }
 
 /// While the two contradict each other a contest is held: each predicts every message before it is
-/// heard, S = max(0, S + ln p1 - ln p2), nats, p1 and p2 the densities that it had by the first and
-/// by the floor and its waits, or, in a burst, as long a wait as the last few, if that is greater
-/// (a cumulative sum, Page, Biometrika 41, 1954). A picture that is
-/// sharp by luck does not stay ahead; one that is right gains ten nats a message, since waits are
-/// predicted badly. `anew`: the first one has just begun again from a line through the last
+/// heard, S = max(0, S + ln p1 - ln p2), nats (a cumulative sum, Page, Biometrika 41, 1954). p1 is
+/// the density that the first picture gave it, p2 that of the floor and its waits, or, where the
+/// first is lost in a burst, of as long a wait as the last few, if that is greater. A picture that
+/// is sharp by luck does not stay ahead; one that is right gains ten nats a message, since waits
+/// are predicted badly. `anew`: the first one has just begun again from a line through the last
 /// messages, which it explains; a hint.
 template <class Grid>
 void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noexcept {
@@ -81,10 +81,8 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool young = floor_.young();
   const bool lost_in_burst = !young && noise > kSharp * floor_.mean_wait() && lead() > kCertain;
   const auto like_last = static_cast<double>(floor_.testimony().like_last);
-  const double floor_says = lost_in_burst && like_last > 0.0
-                                ? std::max(floor_.log_density(), quick_log(like_last))
-                                : floor_.log_density();
-  const double better = plain_.log_density() - floor_says;
+  const double waits = lost_in_burst && like_last > 0.0 ? quick_log(like_last) : kLeastExponent;
+  const double better = plain_.log_density() - std::max(floor_.log_density(), waits);
   // A message that is where both say tells their noise apart, not them.
   const bool tells = finer || std::min(credit, own) < 0.5;
   const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
@@ -105,8 +103,7 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // picture that knows next to nothing, of one that one direction sees so while the other waits
   // through a burst. Noise far smaller than the floor's is none of a floor. One that is not
   // believed does no harm; if it looks for a jump it is left to.
-  const double usual = lost_in_burst && lead() > kCertain ? kBeyondDoubt : kCertain;
-  const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : usual;
+  const double enough = young && (finer || floor_.dry(kConvincing)) ? kConvincing : kCertain;
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
   const bool one_way = kFarLarger * floor_.scale() < noise && floor_.seen_one_way();
   const bool unseen = dry && !one_way && (believed_ || !floor_.seeks_jump());

@@ -59,10 +59,10 @@ void WaitDensity::tabulate() noexcept {
     begin = upper;
     seen = 0.0;
   }
-  // What is left, one message at least, lies in the last cells, as much in each. A longer wait than
-  // any before is seldom, and may be of any size.
-  const double even = std::max(seen, 1.0) / static_cast<double>(kCells - open);
-  const double each = std::max(even, kSeldom * mass);
+  // What is left, one message at least, lies in the last cells, as much in each. Now and then a
+  // wait is longer than all before, by any factor.
+  const double left = std::max({seen, 1.0, kNowAndThen * mass});
+  const double each = left / static_cast<double>(kCells - open);
   for (double width = begin * (std::numbers::sqrt2 - 1.0); open < kCells;
        ++open, width *= std::numbers::sqrt2) {
     density_[open] = static_cast<float>(each / (mass * width));

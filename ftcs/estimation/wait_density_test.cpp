@@ -56,7 +56,7 @@ TEST(WaitDensity, is_finite_for_every_mean_that_it_holds_and_holds_none_that_it_
   EXPECT_FALSE(WaitDensity::holds(90e6));
 }
 
-// One wait in five hundred lies in each half octave beyond all that were seen.
+// Two waits in a hundred are longer than all that were seen, log-uniform.
 TEST(WaitDensity, a_wait_beyond_all_that_were_seen_may_be_of_any_size) {
   WaitDensity waits;
   waits.start(60e3);
