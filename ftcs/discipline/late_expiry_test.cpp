@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "ftcs/clock/virtual_clock.h"
 #include "ftcs/discipline/clock_discipline.h"
 #include "test/support/manual_source.h"
+#include "test/support/watched_clock.h"
 
 namespace ftcs {
 namespace {
@@ -56,31 +56,6 @@ TEST(LateExpiry, leaves_a_command_without_a_correction) {
   EXPECT_EQ(same.correction_rate, hold.correction_rate);
 }
 
-/// Ends every correction late, and says how late.
-class LateClock final : public AdjustableClock {
- public:
-  LateClock(VirtualClock& clock, std::uint64_t seed) : clock_(clock), random_(seed) {}
-  [[nodiscard]] ClockReading read() noexcept override { return clock_.read(); }
-  [[nodiscard]] LocalTime local_at(FreeRunningTime instant) const noexcept override {
-    return clock_.local_at(instant);
-  }
-  [[nodiscard]] RateLimits rate_limits() const noexcept override { return clock_.rate_limits(); }
-  [[nodiscard]] Result<ClockReading, ClockError> apply(
-      const ServoCommand& command) noexcept override {
-    ServoCommand late = command;
-    late.correction_time += Duration::from_ns(lateness_ms_(random_) * kMillisecond);
-    return clock_.apply(late);
-  }
-  [[nodiscard]] Duration expiry_lateness() const noexcept override {
-    return Duration::from_ns(lateness_ms_.max() * kMillisecond);
-  }
-
- private:
-  VirtualClock& clock_;
-  std::mt19937_64 random_;
-  std::uniform_real_distribution<double> lateness_ms_{2.0, 14.0};
-};
-
 // The true error, at most, of the second half of a minute; 1 ms off at first.
 double worst_ns(double interval_ns, std::uint64_t seed) {
   constexpr double kDelayNs = 1'000.0;
@@ -89,21 +64,24 @@ double worst_ns(double interval_ns, std::uint64_t seed) {
     return FreeRunningTime::from_ns(std::llround(1e9 + reference_ns * (1.0 + 20e-6)));
   };
   oscillator.instant = reading(0.0);
-  VirtualClock shown(oscillator, {.free_running = oscillator.instant,
-                                  .local = LocalTime::from_ns(1'000'000),
-                                  .limits = RateLimits::symmetric_ppb(30e6)});
-  LateClock clock(shown, seed);
+  test::WatchedClock clock(
+      oscillator, Duration::from_ns(kMillisecond) - Duration{oscillator.instant.since_epoch()},
+      RateLimits::symmetric_ppb(30e6));
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> lateness_ms(2.0, 14.0);
+  clock.lateness = Duration::from_ns(lateness_ms.max() * kMillisecond);
   ClockDiscipline discipline({}, clock);
   double worst = 0.0;
   const auto message = [&](Direction direction, double sent_ns) {
     const double arrived_ns = sent_ns + kDelayNs;
     const bool forward = direction == Direction::kForward;
     oscillator.instant = reading(arrived_ns + 20e3);
+    clock.ends_late_by = Duration::from_ns(lateness_ms(random) * kMillisecond);
     (void)discipline.on_pair({direction,
                               ReferenceTime::from_ns(std::llround(forward ? sent_ns : arrived_ns)),
                               reading(forward ? arrived_ns : sent_ns)});
     if (sent_ns > 30e9) {
-      const double error_ns = shown.read().local.since_epoch().ns() - (arrived_ns + 20e3);
+      const double error_ns = clock.read().local.since_epoch().ns() - (arrived_ns + 20e3);
       worst = std::max(worst, std::abs(error_ns));
     }
   };

@@ -17,11 +17,6 @@ double log_normal(double distance, double log_variance) noexcept {
   return -0.5 * (distance + log_variance + kLn2Pi);
 }
 
-/// Of a mean, 1/ns.
-double exponential(double wait, double mean) noexcept {
-  return quick_exp(std::max(-wait / mean, kLeastExponent)) / mean;
-}
-
 }  // namespace
 
 void FloorEstimator::restart() noexcept {
@@ -64,13 +59,12 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
       path.recent_share,
       late,
       late && std::min(path.share, path.recent_share) < kNearlyAll,
-      false,
-      0.0F};
+      false};
   testimony_.waiting = late ? path.waits.at(in.centred[best_])
                             : (1.0 - credit) * quick_exp(std::max(said_, kLeastExponent));
   if (late) {
     const double mean = std::max(scale_, static_cast<double>(path.late_by));
-    testimony_.like_last = static_cast<float>(exponential(in.centred[best_], mean));
+    testimony_.like_last = static_cast<float>(-in.centred[best_] / mean - quick_log(mean));
   }
   const double s2 = scale_ * scale_;
   gain_ = credit * s2 * in.predicted[best_] / in.variance[best_];

@@ -11,6 +11,7 @@
 #include "ftcs/estimation/floor_search.h"
 #include "ftcs/estimation/jump_watch.h"
 #include "ftcs/estimation/model_bank.h"
+#include "ftcs/estimation/quick_math.h"
 #include "ftcs/estimation/wait_density.h"
 
 namespace ftcs::estimation {
@@ -38,7 +39,8 @@ class FloorEstimator {
     bool late = false;
     bool waited = false;       ///< late, where waiting is usual
     bool offset_jump = false;  ///< a jump of the offset explains it, and those before, better
-    float like_last = 0.0F;    ///< density of one that waits as the last few did, 1/ns
+    /// ln density of one that waits as the last few did
+    float like_last = static_cast<float>(kLeastExponent);
   };
 
   /// No floor, and nothing recorded.
@@ -151,8 +153,9 @@ class FloorEstimator {
 
   /// Messages since it was begun, of the direction that has fewer.
   [[nodiscard]] double heard() const noexcept;
-  /// By how much messages may seem to arrive before they were sent: latencies of stamps that nobody
-  /// calibrated, small beside the waits. ns.
+  /// By how much messages may seem to arrive before they were sent at a floor whose delay was above
+  /// zero: small beside the waits. (What ends one that is followed, by stamps whose latency nobody
+  /// calibrated, is larger: LoadAwareEstimator::impossible.) ns.
   [[nodiscard]] double early_arrival() const noexcept { return mean_wait_ / kFarLarger; }
   /// Too few to tell waits from a path that has changed.
   [[nodiscard]] bool surmised() const noexcept { return heard() < kSurmised; }

@@ -40,8 +40,8 @@ void FloorEstimator::begin_path(Path& path, double share, double members, double
   path.members = members;
   path.heard = path.dry = 0.0;
   path.there = path.pending = false;
-  path.told =
-      found_ ? static_cast<float>(path.share) : 0.0F;  // one that was surmised tells nothing
+  // A share that was surmised tells nothing.
+  path.told = found_ ? static_cast<float>(path.share) : 0.0F;
   path.late_by = 0.0F;
   path.unseen = 0;
   path.mean_wait = static_cast<float>(wait);

@@ -81,7 +81,7 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool young = floor_.young();
   const bool lost_in_burst = !young && noise > kSharp * floor_.mean_wait() && lead() > kCertain;
   const auto like_last = static_cast<double>(floor_.testimony().like_last);
-  const double waits = lost_in_burst && like_last > 0.0 ? quick_log(like_last) : kLeastExponent;
+  const double waits = lost_in_burst ? like_last : kLeastExponent;
   const double better = plain_.log_density() - std::max(floor_.log_density(), waits);
   // A message that is where both say tells their noise apart, not them.
   const bool tells = finer || std::min(credit, own) < 0.5;
