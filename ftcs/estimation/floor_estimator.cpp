@@ -342,6 +342,10 @@ double FloorEstimator::offset_sigma_ns(double cycles) const noexcept {
   return scale_ * std::sqrt(std::max(then.xx, 0.0));
 }
 
+double FloorEstimator::likeliest_sigma_ns() const noexcept {
+  return scale_ * std::sqrt(std::max(bank_.estimate(best_).xx, 0.0));
+}
+
 double FloorEstimator::rate_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.yy); }
 double FloorEstimator::delay_sigma_ns() const noexcept { return scale_ * std::sqrt(mixed_.dd); }
 

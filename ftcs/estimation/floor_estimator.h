@@ -111,6 +111,9 @@ class FloorEstimator {
   [[nodiscard]] double noise_ns(Direction direction) const noexcept;
   [[nodiscard]] double share(Direction direction) const noexcept { return paths_[direction].share; }
   [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
+  /// The same now by the likeliest model alone: of a floor just found even the wildest are thought
+  /// possible, by which the clock may be anywhere.
+  [[nodiscard]] double likeliest_sigma_ns() const noexcept;
   [[nodiscard]] double rate_sigma_ns() const noexcept;
   [[nodiscard]] double delay_sigma_ns() const noexcept;
 

@@ -55,13 +55,14 @@ class Fit {
     fit.estimate.y = best_.rate;
     fit.has_rate = true;
     start(fit);
-    PerDirection<Waits> waits;
-    for (int round = 0; round < kRounds; ++round) {
-      waits = {};
-      if (!improve(fit, waits)) return fit;
-    }
-    tell_apart(fit, waits);
+    if (!settle(fit, false)) return fit;
+    FloorFit drifting = fit;
     judge(fit);
+    if (may_drift(fit) && settle(drifting, true) && may_drift(drifting)) {
+      judge(drifting);
+      const bool better = drifting.evidence > fit.evidence || !fit.found;
+      if (drifting.found && better) fit = drifting;
+    }
     fit.estimate.x += base_;
     return fit;
   }
@@ -183,15 +184,36 @@ class Fit {
 
   [[nodiscard]] double innovation(const FloorFit& fit, Direction direction,
                                   const RecordedMessage& m, double time) const noexcept {
-    return height(direction, m, fit.estimate.y, time) - sign_of(direction) * fit.estimate.x -
-           fit.estimate.d;
+    return sign_of(direction) * (m.z - base_ - fit.offset_at(time)) - fit.estimate.d;
+  }
+
+  /// Messages wait, enough for four unknowns did not, and the waits are what is long.
+  [[nodiscard]] bool may_drift(const FloorFit& fit) const noexcept {
+    const bool clear = fit.clear(Direction::kForward) && fit.clear(Direction::kBackward);
+    const double span = std::min(windows_.forward.oldest(), windows_.backward.oldest());
+    return !clear && fit.members.forward + fit.members.backward >= kLately &&
+           0.5 * std::abs(fit.drift) * span * span < static_cast<double>(fit.mean_wait);
+  }
+
+  /// All rounds. False: nothing determines the line.
+  [[nodiscard]] bool settle(FloorFit& fit, bool drifts) const noexcept {
+    PerDirection<Waits> waits;
+    for (int round = 0; round < kRounds; ++round) {
+      waits = {};
+      if (!improve(fit, waits, drifts)) return false;
+    }
+    tell_apart(fit, waits);
+    return true;
   }
 
   /// One round of expectation and maximisation. False: nothing determines the
   /// line.
-  [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits) const noexcept {
-    LineSums sums;
+  [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits,
+                             bool drifts) const noexcept {
+    DriftSums sums;
     double squares = 0.0;  // of z
+    // One later than this waited, whatever the shares, and costs no exponential.
+    const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
     for (const Direction direction : kDirections) {
       const RecordWindow& window = windows_[direction];
       double members = 0.0;
@@ -199,6 +221,11 @@ class Fit {
         const RecordedMessage& m = window[k];
         const double time = window.time(m);
         const double nu = innovation(fit, direction, m, time);
+        if (nu > latest) {
+          waits[direction].messages += 1.0;
+          waits[direction].ns += nu;
+          continue;
+        }
         double density = 0.0;
         const double credit = fit.noise[direction].at_floor(nu, density);
         // Relative to the line so far: small numbers, whose squares lose
@@ -215,15 +242,20 @@ class Fit {
       fit.noise[direction].share = std::clamp(share, 0.01, 0.99);
     }
     Estimate change;
+    double drift = 0.0;
+    const LineSums& line = sums.line;
     const bool enough =
-        fit.members.forward >= 1.5 && fit.members.backward >= 1.5 && sums.n >= kRepeated;
-    if (!enough || !sums.solve(change)) return false;
-    const double explained = change.x * sums.z + change.y * sums.tz + change.d * sums.sz;
+        fit.members.forward >= 1.5 && fit.members.backward >= 1.5 && line.n >= kRepeated;
+    if (!enough || !(drifts ? sums.solve(change, drift) : line.solve(change))) return false;
+    const double explained =
+        change.x * line.z + change.y * line.tz + change.d * line.sz + 0.5 * drift * sums.ttz;
+    fit.drift += drift;
     change.x += fit.estimate.x;
     change.y += fit.estimate.y;
     change.d += fit.estimate.d;
     fit.estimate = change;
-    const double variance = std::max(0.0, squares - explained) / std::max(1.0, sums.n - 3.0);
+    const double variance =
+        std::max(0.0, squares - explained) / std::max(1.0, line.n - (drifts ? 4.0 : 3.0));
     const double sigma = std::max(smallest_, std::sqrt(variance));
     const double waited = waits.forward.messages + waits.backward.messages;
     if (waited > 1.0) {
@@ -256,22 +288,25 @@ class Fit {
   void judge(FloorFit& fit) const noexcept {
     const double sigma = fit.sigma();
     const auto wait = static_cast<double>(fit.mean_wait);
-    const double chosen = 1.5 * quick_log(std::max(std::numbers::e, wait / sigma));
+    const double chosen = quick_log(std::max(std::numbers::e, wait / sigma));
     PerDirection<double> speaks{};
     bool lasting = true;
     for (const Direction direction : kDirections) {
       const double gained = judge(fit, direction, lasting);
       speaks[direction] = gained - chosen;
     }
+    const double shared = fit.drift != 0.0 ? 2.0 * chosen : chosen;  // rate, and its drift
     const bool ahead = fit.clear(Direction::kForward);
     const bool back = fit.clear(Direction::kBackward);
     if (ahead == back) {
-      // Together they must convince for two, and each speak for half of that.
-      const double sum = speaks.forward + speaks.backward;
-      const double less = std::min(speaks.forward, speaks.backward);
+      // Together they must convince for two, and each speak for half of that. Each tells its own
+      // level, the one that says more what both share.
+      const double sum = speaks.forward + speaks.backward - shared;
+      const double more = std::max(speaks.forward, speaks.backward);
+      const double less = std::min(std::min(speaks.forward, speaks.backward), more - shared);
       fit.evidence = ahead ? sum : std::min(0.5 * sum, 2.0 * less);
     } else {
-      fit.evidence = ahead ? speaks.backward : speaks.forward;
+      fit.evidence = (ahead ? speaks.backward : speaks.forward) - 0.5 * shared;
     }
     const double longer = std::max(fit.noise.forward.mean_wait, fit.noise.backward.mean_wait);
     fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFew &&

@@ -29,16 +29,30 @@ struct FloorFit {
   bool has_rate = false;   ///< estimate.y at least is worth something
   float mean_wait = 0.0F;  ///< ns, of both directions together
   Estimate estimate{};     ///< at `now` of the windows; covariances in units of sigma^2
+  double drift = 0.0;      ///< of the rate, ns per cycle^2; 0: a line fits as well
   PerDirection<FloorNoise> noise{};
   PerDirection<double> members{};  ///< messages at the floor
   /// Nats by which the floor explains the messages of one direction better than waits without one
-  /// do; what the choice of three unknowns is worth is taken off. Where both have waits it is the
-  /// mean of both, and at most twice that of the direction that has less.
+  /// do; what the choice of the unknowns is worth is taken off: of its level from each, and of the
+  /// rate and its drift, which both share, from the one that says more. Where both have waits it is
+  /// the mean of both, and at most twice that of the direction that has less; where one has none,
+  /// it has told half of what is shared.
   double evidence = 0.0;
   double log_likelihood = 0.0;  ///< of all messages
   double said = 0.0;            ///< the same by the filters that heard them
 
   [[nodiscard]] double sigma() const noexcept { return noise.forward.sigma; }
+  /// ns, `time` cycles from `now`.
+  [[nodiscard]] double offset_at(double time) const noexcept {
+    return estimate.x + (estimate.y + 0.5 * drift * time) * time;
+  }
+  /// Time passes, cycles.
+  void elapse(double time) noexcept {
+    const double x = offset_at(time);
+    estimate.elapse(time, {});
+    estimate.x = x;
+    estimate.y += drift * time;
+  }
   /// Standard deviation of the offset, ns.
   [[nodiscard]] double offset_sigma_ns() const noexcept;
   /// Hardly any message of this direction is late: its floor needs no proof.
@@ -57,7 +71,11 @@ struct FloorFit {
 ///    beyond it.
 /// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line,
 ///    sigma, shares and one mean wait of both directions under FloorNoise, from the best candidate.
-/// 4. A mean wait for each direction, where they differ beyond chance: ports of 1 Gbit/s and 100
+/// 4. The same with a drift of the rate, since the oscillator wanders while a floor is looked for
+/// that
+///    few messages reach. It is taken where the floor is then more evident, and where it moves the
+///    line by less than messages wait: more is no wander that a line all but fits.
+/// 5. A mean wait for each direction, where they differ beyond chance: ports of 1 Gbit/s and 100
 ///    Mbit/s lie on one path. (The line is found before: two scales more let it settle anywhere.)
 ///
 /// `least_noise`: no sigma is smaller, ns. found is false where the windows

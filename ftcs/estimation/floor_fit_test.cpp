@@ -15,6 +15,7 @@ using Record = FloorRecord<128>;
 
 struct World {
   double x = 5000.0, y = 6250.0, d = 10e3;
+  double drift = 0.0;  ///< ns per cycle^2
   double noise = 20.0, mean_wait = 60e3;
   PerDirection<double> waiting{0.5, 0.5};  ///< share
 };
@@ -33,7 +34,8 @@ Record record_of(const World& world, int cycles, std::uint64_t seed) {
     record.elapse(step);
     const double late = even(random) < world.waiting[direction] ? wait(random) : 0.0;
     const double delay = world.d + normal(random) + late;
-    const double z = world.x + world.y * time + sign_of(direction) * delay;
+    const double offset = world.x + (world.y + 0.5 * world.drift * time) * time;
+    const double z = offset + sign_of(direction) * delay;
     (void)record.push({direction, z, 0.0, false, 0.0});
   }
   return record;
@@ -69,6 +71,58 @@ TEST(FloorFit, finds_offset_rate_and_delay_where_most_messages_wait) {
     }
     EXPECT_GE(found, 18) << waiting;
   }
+}
+
+// An oscillator that wanders while hardly any message reaches the floor.
+TEST(FloorFit, finds_a_floor_under_a_rate_that_drifts) {
+  World world;
+  world.waiting = {0.8, 0.8};
+  world.drift = 0.05;  // 410 ns in 128 cycles
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const FloorFit fit = fit_floor(last(record_of(world, 128, seed), 128), 0.4);
+    if (!fit.found || fit.evidence < 10.0) continue;
+    ++found;
+    EXPECT_NEAR(fit.drift, world.drift, 0.02) << seed;
+    EXPECT_NEAR(fit.sigma(), world.noise, 12.0) << seed;
+    EXPECT_NEAR(fit.estimate.d, world.d, 5.0 * fit.sigma() * std::sqrt(fit.estimate.dd)) << seed;
+  }
+  EXPECT_GE(found, 18);
+}
+
+// What curves by more than messages wait is no line that they lie on.
+TEST(FloorFit, a_drift_is_small_beside_the_waits) {
+  World world;
+  world.waiting = {0.8, 0.8};
+  world.drift = 10.0;  // 82 us in 128 cycles
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const FloorFit fit = fit_floor(last(record_of(world, 128, seed), 128), 0.4);
+    EXPECT_FALSE(fit.found && fit.drift != 0.0) << seed;
+  }
+}
+
+TEST(FloorFit, is_the_same_curve_when_time_has_passed) {
+  FloorFit fit;
+  fit.estimate.x = 100.0;
+  fit.estimate.y = 3.0;
+  fit.drift = 0.5;
+  const double later = fit.offset_at(7.0);
+  fit.elapse(5.0);
+  EXPECT_DOUBLE_EQ(fit.offset_at(2.0), later);
+}
+
+// The rate is known by the one: the other has its own level to tell.
+TEST(FloorFit, a_direction_with_few_messages_at_the_floor_need_not_tell_the_rate) {
+  World world;
+  world.waiting = {0.8, 0.94};
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const FloorFit fit = fit_floor(last(record_of(world, 128, seed), 128), 0.4);
+    if (!fit.found || fit.evidence < 10.0) continue;
+    ++found;
+    EXPECT_NEAR(fit.estimate.d, world.d, 100.0) << seed;
+  }
+  EXPECT_GE(found, 78);
 }
 
 TEST(FloorFit, finds_no_floor_where_every_message_waits) {

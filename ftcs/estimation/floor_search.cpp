@@ -38,7 +38,7 @@ void FloorSearch::restart() noexcept {
 void FloorSearch::hear(const Record::Message& message, double elapsed) noexcept {
   record_.elapse(elapsed);
   recent_.elapse(elapsed);
-  if (best_wanted_ > 0) best_.estimate.elapse(elapsed, {});
+  if (best_wanted_ > 0) best_.elapse(elapsed);
   (void)recent_.push({message.direction, message.z, message.said, false, message.rate});
   fresh_ = record_.push(message) || fresh_;
   ++messages_;
@@ -171,9 +171,8 @@ void FloorSearch::end(const Rival& rival) noexcept {
 }
 
 void FloorSearch::adopt() noexcept {
-  const Estimate e = best_.estimate;
   const auto said = [&](Direction direction, double time, double z) {
-    const double nu = sign_of(direction) * (z - e.x - e.y * time) - e.d;
+    const double nu = sign_of(direction) * (z - best_.offset_at(time)) - best_.estimate.d;
     double density = 0.0;
     (void)best_.noise[direction].at_floor(nu, density);
     return quick_log(density);

@@ -117,8 +117,7 @@ void FloorSearch::each_member(Hear hear) const noexcept {
     const RecordWindow& w = window[direction];
     const RecordedMessage& m = w[k[direction]++];
     const double t = w.time(m);
-    const Estimate& e = best_.estimate;
-    const double nu = sign_of(direction) * (m.z - e.x - e.y * t) - e.d;
+    const double nu = sign_of(direction) * (m.z - best_.offset_at(t)) - best_.estimate.d;
     double density = 0.0;
     if (best_.noise[direction].at_floor(nu, density) > 0.5) hear(direction, t, m.z);
   }

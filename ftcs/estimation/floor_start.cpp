@@ -98,7 +98,7 @@ void FloorEstimator::hear_members_again(const FloorFit& fit) noexcept {
   search_.each_member([&](Direction direction, double time, double z) {
     if (heard == 0) {
       Estimate start = fit.estimate;
-      start.x += start.y * time;
+      start.x = fit.offset_at(time);
       start.xx = start.dd = start.yy = kWide;
       start.xy = start.xd = start.yd = 0.0;
       bank_.start(start);

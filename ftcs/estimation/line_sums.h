@@ -63,4 +63,47 @@ struct LineSums {
   }
 };
 
+/// The same with a frequency drift D: z = x + y t + D t^2 / 2 + sign d. What t^2 has that no line
+/// has tells D, and the line is what is left of z (Frisch and Waugh, Econometrica 1, 1933):
+///
+///     D / 2 = (sum t^2 z - q'v) / s,   s = sum t^4 - q'u,   q = (sum t^2, sum t^3, sum sign t^2)'
+///     line = v - u D / 2,   covariance = A^-1 + u u' / s        A u = q, A v = (sz, stz, ssz)'
+struct DriftSums {
+  LineSums line;
+  double ttt = 0.0, tts = 0.0, tttt = 0.0, ttz = 0.0;
+
+  void add(double sign, double time, double reading, double weight = 1.0) noexcept {
+    line.add(sign, time, reading, weight);
+    const double square = weight * time * time;
+    ttt += square * time;
+    tts += square * sign;
+    tttt += square * time * time;
+    ttz += square * reading;
+  }
+
+  /// All four. False: the messages do not determine them.
+  [[nodiscard]] bool solve(Estimate& e, double& drift) const noexcept {
+    LineSums square = line;
+    square.z = line.tt;
+    square.tz = ttt;
+    square.sz = tts;
+    Estimate u;
+    if (!line.solve(e) || !square.solve(u)) return false;
+    const double own = tttt - (u.x * line.tt + u.y * ttt + u.d * tts);
+    if (!(own > 1e-9 * tttt)) return false;  // what rounding leaves
+    const double half = (ttz - (e.x * line.tt + e.y * ttt + e.d * tts)) / own;
+    drift = 2.0 * half;
+    e.x -= half * u.x;
+    e.y -= half * u.y;
+    e.d -= half * u.d;
+    e.xx += u.x * u.x / own;
+    e.xy += u.x * u.y / own;
+    e.xd += u.x * u.d / own;
+    e.yy += u.y * u.y / own;
+    e.yd += u.y * u.d / own;
+    e.dd += u.d * u.d / own;
+    return true;
+  }
+};
+
 }  // namespace ftcs::estimation

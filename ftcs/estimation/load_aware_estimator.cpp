@@ -45,7 +45,7 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
   const double apart = apart_ns();
-  const double floor = floor_.offset_sigma_ns(0.0);
+  const double floor = floor_.likeliest_sigma_ns();
   const double plain = plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
   return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
