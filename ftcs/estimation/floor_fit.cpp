@@ -306,7 +306,7 @@ class Fit {
       const double less = std::min(std::min(speaks.forward, speaks.backward), more - shared);
       fit.evidence = ahead ? sum : std::min(0.5 * sum, 2.0 * less);
     } else {
-      fit.evidence = (ahead ? speaks.backward : speaks.forward) - 0.5 * shared;
+      fit.evidence = ahead ? speaks.backward : speaks.forward;
     }
     const double longer = std::max(fit.noise.forward.mean_wait, fit.noise.backward.mean_wait);
     fit.found = lasting && std::min(fit.members.forward, fit.members.backward) >= kFew &&

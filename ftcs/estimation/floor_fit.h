@@ -35,8 +35,8 @@ struct FloorFit {
   /// Nats by which the floor explains the messages of one direction better than waits without one
   /// do; what the choice of the unknowns is worth is taken off: of its level from each, and of the
   /// rate and its drift, which both share, from the one that says more. Where both have waits it is
-  /// the mean of both, and at most twice that of the direction that has less; where one has none,
-  /// it has told half of what is shared.
+  /// the mean of both, and at most twice that of the direction that has less; one that has none
+  /// needs no proof, and has told the rate.
   double evidence = 0.0;
   double log_likelihood = 0.0;  ///< of all messages
   double said = 0.0;            ///< the same by the filters that heard them
