@@ -16,6 +16,12 @@ namespace {
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
 
+/// As the mean of its models says, without what it adds to what it states.
+template <class Picture>
+double bare_sigma_ns(const Picture& plain) noexcept {
+  return plain.scale() * std::sqrt(std::max(0.0, plain.estimate().xx));
+}
+
 }  // namespace
 
 /// Of one message by the first picture, or of what it believes, if that is worse.
@@ -45,9 +51,8 @@ void LoadAwareEstimator<Grid>::forget_floor() noexcept {
 template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
   const double apart = apart_ns();
-  const double floor = floor_.likeliest_sigma_ns();
-  const double plain = plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
-  return plain < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
+  const double floor = floor_.offset_sigma_ns(0.0);
+  return bare_sigma_ns(plain_) < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
 /// Messages at such a floor would arrive before they were sent, by more than latencies of stamps
@@ -132,7 +137,10 @@ bool LoadAwareEstimator<Grid>::welcome() noexcept {
     return false;
   }
   const bool agreed = agree();
-  if (agreed) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
+  // All models of a few messages leave more open than the first picture does, even one that is
+  // lost.
+  const bool knows = bare_sigma_ns(plain_) < 2.0 * floor_.likeliest_sigma_ns();
+  if (agreed && knows) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
   const double apart = apart_ns();
   const bool contradicts = together_ && !agreed && much < apart;
   if (!believed_ || contradicts) doubt_floor();
