@@ -126,7 +126,7 @@ void LoadAwareEstimator<Grid>::doubt_floor() noexcept {
 
 /// A floor has been found. One that has far more noise than the first picture is none. One that
 /// contradicts what both believed so far, among messages from before, has to convince first.
-/// True: both say the same.
+/// True: both say the same, and the first one knows it.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::welcome() noexcept {
   contest_ = 0.0;
@@ -139,13 +139,13 @@ bool LoadAwareEstimator<Grid>::welcome() noexcept {
   const bool agreed = agree();
   // All models of a few messages leave more open than the first picture does, even one that is
   // lost.
-  const bool knows = bare_sigma_ns(plain_) < 2.0 * floor_.likeliest_sigma_ns();
-  if (agreed && knows) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
+  const bool known = agreed && bare_sigma_ns(plain_) < 2.0 * floor_.likeliest_sigma_ns();
+  if (known) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
   const double apart = apart_ns();
   const bool contradicts = together_ && !agreed && much < apart;
   if (!believed_ || contradicts) doubt_floor();
   together_ = apart < noise;
-  return agreed;
+  return known;
 }
 
 /// On a path that was settled: a second message of the last few that is late by
