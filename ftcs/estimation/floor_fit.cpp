@@ -206,12 +206,10 @@ class Fit {
     return true;
   }
 
-  /// One round of expectation and maximisation. False: nothing determines the
-  /// line.
-  [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits,
-                             bool drifts) const noexcept {
-    DriftSums sums;
-    double squares = 0.0;  // of z
+  /// Expectation: adds each message by the probability that it is at the floor. Their squares.
+  [[nodiscard]] double expect(FloorFit& fit, DriftSums& sums,
+                              PerDirection<Waits>& waits) const noexcept {
+    double squares = 0.0;
     // One later than this waited, whatever the shares, and costs no exponential.
     const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
     for (const Direction direction : kDirections) {
@@ -228,8 +226,7 @@ class Fit {
         }
         double density = 0.0;
         const double credit = fit.noise[direction].at_floor(nu, density);
-        // Relative to the line so far: small numbers, whose squares lose
-        // nothing.
+        // Relative to the line so far: small numbers, whose squares lose nothing.
         const double left = sign_of(direction) * nu;
         sums.add(sign_of(direction), time, left, credit);
         squares += credit * nu * nu;
@@ -241,6 +238,14 @@ class Fit {
       const double share = members / static_cast<double>(window.size);
       fit.noise[direction].share = std::clamp(share, 0.01, 0.99);
     }
+    return squares;
+  }
+
+  /// One round of expectation and maximisation. False: nothing determines the line.
+  [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits,
+                             bool drifts) const noexcept {
+    DriftSums sums;
+    const double squares = expect(fit, sums, waits);
     Estimate change;
     double drift = 0.0;
     const LineSums& line = sums.line;
@@ -313,8 +318,7 @@ class Fit {
                 sigma < kSharp * wait && WaitDensity::holds(longer);
   }
 
-  /// Nats by which the floor explains one direction better than waits without
-  /// one.
+  /// Nats by which the floor explains one direction better than waits without one.
   [[nodiscard]] double judge(FloorFit& fit, Direction direction, bool& lasting) const noexcept {
     const RecordWindow& window = windows_[direction];
     const double young = std::min(windows_.forward.time(windows_.forward[0]),
