@@ -85,9 +85,10 @@ class Evidence {
     return lane_of(lowest, place, best_cost);
   }
 
-  /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean a
-  /// place, sum one. Which of two models that explain the messages alike is right cannot be told,
-  /// and the calmer one is the better bet for the mean; the deviation answers for the other.
+  /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean for each
+  /// model that is calmer, sum one. Which of two models that explain the messages alike is right
+  /// cannot be told, and the calmer one is the better bet for the mean; the deviation answers for
+  /// the other. (The one that stands for several of the full bank answers for its neighbour.)
   static void lean(const Row& weight, Row& leaning) noexcept {
     V sum{};
     for (std::size_t i = 0; i < kSize; i += kStep) {
@@ -156,12 +157,8 @@ class Evidence {
   static constexpr double kLean = 1.7;
   static constexpr Row kLeaning = []() constexpr {
     Row row{};
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double places = Grid::places_from_start(i);
-      row[i] = 1.0;
-      for (double k = 0.0; k < places; ++k) row[i] *= kLean;
-      for (double k = 0.0; k > places; --k) row[i] /= kLean;
-    }
+    row[0] = Grid::kCalmFavour > 0.0 ? kLean : 1.0;
+    for (std::size_t i = 1; i < kSize; ++i) row[i] = i == 1 ? kLean : kLean * row[i - 1];
     return row;
   }
   ();

@@ -82,7 +82,13 @@ double FloorEstimator::follow(const Observation& seen) noexcept {
   return credit;
 }
 
-/// The density in the head of the class, for all models.
+/// The density in the head of the class, for all models. A message may have waited, with the
+/// probability 1 - c, and then says nothing of the clock. The mean and the variance that are left
+/// are those of both cases together, but that no message makes what is known less:
+///
+///     slope' = c slope,   curvature' = c max(0, curvature - (1 - c) slope^2)
+///
+/// (the spread of probabilistic data association: Bar-Shalom and Tse, Automatica 11, 1975).
 FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
                                                         const Path& path) const noexcept {
   using V = Bank::V;
@@ -100,10 +106,12 @@ FloorEstimator::Bank::Innovations FloorEstimator::judge(const Observation& seen,
     const V normal = path.share * quick_exp(log_density);
     const V density = normal + other;
     const V credit = normal / density;
-    store(&in.credit[i], credit);
     store(&in.log_density[i], quick_log(density));
-    store(&in.slope[i], load<V>(&in.slope[i]) * credit);
-    store(&in.curvature[i], load<V>(&in.curvature[i]) * credit);
+    const V slope = load<V>(&in.slope[i]);
+    const V spread = (V{} + 1.0 - credit) * slope * slope;
+    store(&in.credit[i], credit);
+    store(&in.slope[i], credit * slope);
+    store(&in.curvature[i], credit * larger<V>(V{}, load<V>(&in.curvature[i]) - spread));
   }
   return in;
 }
@@ -306,8 +314,10 @@ void FloorEstimator::choose() noexcept {
 }
 
 void FloorEstimator::mix() noexcept {
-  mixed_ = bank_.mixture(weight_, weight_, scale_);
-  process_ = bank_.mean_noise(weight_);
+  Row doubt;
+  Evidence<FloorGrid>::lean(weight_, doubt);
+  mixed_ = bank_.mixture(weight_, doubt, scale_);
+  process_ = bank_.mean_noise(doubt);
 }
 
 FloorSearch::Rival FloorEstimator::rival() const noexcept {
