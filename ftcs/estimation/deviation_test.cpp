@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // World: a rate that walks, and a port that is saturated for a minute at a time, or where nearly
-// all messages wait, some for next to nothing. Two messages a cycle, normal noise. Oracle: the
-// truth. The stated deviation must hold while and after next to nothing has been at the floor.
+// all messages wait, some for next to nothing; a rate that steps. Two messages a cycle, normal
+// noise. Oracle: the truth. The stated deviation must hold while and after next to nothing has been
+// at the floor, and before a step is believed.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -20,8 +21,8 @@ constexpr double kDelay = 10'000.0;
 /// Share of the errors within 1, 2 and 3 of the stated deviations.
 class Shares {
  public:
-  void add(const LoadAwareEstimator<FullGrid>& estimator, double truth) {
-    const double error = std::abs(estimator.estimate().x - truth) / estimator.offset_sigma_ns(0.0);
+  void add(double off, double sigma) {
+    const double error = std::abs(off) / sigma;
     for (std::size_t k = 0; k < 3; ++k) inside_[k] += error < static_cast<double>(k + 1) ? 1 : 0;
     ++judged_;
   }
@@ -67,7 +68,31 @@ Shares loaded(const Loaded& world) {
       const double queued = even(random) < waiting ? wait(random) : 0.0;
       const double late = queued + kNoise * normal(random);
       (void)estimator->update({.sign = sign, .elapsed = 0.5, .z = x + sign * (kDelay + late)});
-      if (i >= world.from) shares.add(*estimator, x);
+      if (i >= world.from) shares.add(estimator->estimate().x - x, estimator->offset_sigma_ns(0.0));
+    }
+  }
+  return shares;
+}
+
+/// +-1 ppm at 125 ms, every fifty cycles.
+Shares steps() {
+  constexpr double kNoise = 100.0;
+  Shares shares;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const auto estimator = std::make_unique<LoadAwareEstimator<FullGrid>>();
+    const int phase = static_cast<int>(random() % 100);
+    double x = 0.0;
+    double y = 0.0;
+    for (int i = 0; i < 4800; ++i) {
+      x += 0.5 * y;
+      y = 6'250.0 + ((i + phase) / 100 % 2 == 0 ? 125.0 : -125.0);
+      const double sign = i % 2 == 0 ? 1.0 : -1.0;
+      const double late = kNoise * normal(random);
+      (void)estimator->update({.sign = sign, .elapsed = 0.5, .z = x + sign * (kDelay + late)});
+      if (i < 1200) continue;
+      shares.add(estimator->estimate().x - x, estimator->offset_sigma_ns(0.0));
     }
   }
   return shares;
@@ -83,6 +108,12 @@ TEST(Deviation, holds_where_a_message_just_late_may_have_waited) {
   const Shares shares = loaded({0.1, 10'000.0, 0.97, 0.97, 1, 1, 2400, 7200});
   shares.print("just late");
   EXPECT_GT(shares.within(3), 0.995);
+}
+
+TEST(Deviation, holds_before_a_step_of_the_rate_is_believed) {
+  const Shares shares = steps();
+  shares.print("steps");
+  EXPECT_GT(shares.within(3), 0.99);
 }
 
 }  // namespace

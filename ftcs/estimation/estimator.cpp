@@ -179,7 +179,7 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     hear_again(seen, outliers);
   }
   learn_noise(side, innovation, innovations);
-  if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
+  if (count_ > kEvidenceFrom) follow_surprise(innovations);
   seek_second_opinion(seen, innovation);
   choose();
   mix();
@@ -290,7 +290,7 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
   evidence_.forget();
   second_opinion_.adopt(start);
   surprise_ = 0;
-  surprise_level_ = 1.0;
+  unexplained_ = 0.0;
   count_ = kRepeated;
 }
 

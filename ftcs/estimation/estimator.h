@@ -159,8 +159,7 @@ class Estimator {
   [[nodiscard]] bool observable() const noexcept;
   /// The path delay is estimated, not given or pinned.
   [[nodiscard]] bool delay_free() const noexcept { return two_way() && !known_delay().known(); }
-  void follow_surprise(std::size_t side, const Innovations& innovations) noexcept;
-  [[nodiscard]] double widening() const noexcept;
+  void follow_surprise(const Innovations& innovations) noexcept;
   [[nodiscard]] double floor_doubt_ns() const noexcept;
 
   KnownDelay known_delay_{};
@@ -191,9 +190,9 @@ class Estimator {
   double robust_scale_ = 100.0;
   double least_noise_ = kLeastNoise;
   float gain_ = 1.0F;
-  float innovation_ = 0.0F;      ///< of the last message
-  double surprise_level_ = 1.0;  ///< recent mean of normalised squared innovations
-  NoiseModel process_{};         ///< mean of the models' noise as far as it is in doubt
+  float innovation_ = 0.0F;   ///< of the last message
+  double unexplained_ = 0.0;  ///< ns^2, of the last innovation squared
+  NoiseModel process_{};      ///< mean of the models' noise as far as it is in doubt
   Estimate mixed_{};
 };
 

@@ -11,10 +11,8 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Eight messages: short enough for the three or four that follow a change, long
-/// enough not to follow the noise. Its usual fluctuation stays below 1.6.
-constexpr double kSurpriseShare = 1.0 / kLately;
-constexpr double kUsualSurprise = 1.6;
+/// Normalised innovation squared up to which noise explains it: two sigma.
+constexpr double kUsual = 4.0;
 /// The sharpest shape tried has a normal part of a seventh of the tail. Where
 /// that is the best shape the true edge is anything between that soft and as
 /// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
@@ -160,20 +158,12 @@ void Estimator<Grid>::doubt_delay() noexcept {
   bank_.for_each([=](Estimate& e) { e.doubt_delay(sign, std::max(0.0, least - e.dd)); });
 }
 
-/// Exponential mean of nu^2 / S of the best model. What is taken for an outlier
-/// counts as far as outliers are not what one expects on this path.
+/// What the noise does not explain of the last message's innovation the clock may have done since
+/// the one before: max(0, nu^2 - 4 S), ns^2, as far as the message is no outlier.
 template <class Grid>
-void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
-  const double normalised = std::min(innovations.distance[best_], kEightSigma);
-  const double credit = innovations.credit[best_];
-  const double unexpected = std::max(0.0, 1.0 - gate_.late_outliers(side) / kNowAndThen);
-  const double level = credit * normalised + (1.0 - credit) * (1.0 + unexpected * normalised);
-  surprise_level_ += kSurpriseShare * (level - surprise_level_);
-}
-
-template <class Grid>
-double Estimator<Grid>::widening() const noexcept {
-  return std::max(1.0, surprise_level_ / kUsualSurprise);
+void Estimator<Grid>::follow_surprise(const Innovations& innovations) noexcept {
+  const double normalised = innovations.credit[best_] * innovations.distance[best_];
+  unexplained_ = std::max(0.0, normalised - kUsual) * innovations.variance[best_];
 }
 
 /// Where the floor of a queueing delay lies is known to a few per cent of its
@@ -195,17 +185,17 @@ double Estimator<Grid>::offset_sigma_ns(double cycles) const noexcept {
   Estimate then = mixed_;
   then.elapse(std::max(0.0, cycles), {process_.white_fm, process_.random_walk_fm, 0.0});
   const double floor = floor_doubt_ns();
-  return std::sqrt(scale_ * scale_ * widening() * std::max(then.xx, 0.0) + floor * floor);
+  return std::sqrt(scale_ * scale_ * std::max(then.xx, 0.0) + unexplained_ + floor * floor);
 }
 
 template <class Grid>
 double Estimator<Grid>::rate_sigma_ns() const noexcept {
-  return scale_ * std::sqrt(widening() * mixed_.yy);
+  return scale_ * std::sqrt(mixed_.yy);
 }
 
 template <class Grid>
 double Estimator<Grid>::delay_sigma_ns() const noexcept {
-  return std::sqrt(scale_ * scale_ * widening() * mixed_.dd + floor_doubt_ns() * floor_doubt_ns());
+  return std::sqrt(scale_ * scale_ * mixed_.dd + floor_doubt_ns() * floor_doubt_ns());
 }
 
 template <class Grid>
@@ -217,7 +207,7 @@ template void Estimator<FullGrid>::mix() noexcept;
 template void Estimator<FullGrid>::follow_scale() noexcept;
 template void Estimator<FullGrid>::adopt_shapes() noexcept;
 template void Estimator<FullGrid>::doubt_delay() noexcept;
-template void Estimator<FullGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
+template void Estimator<FullGrid>::follow_surprise(const Innovations&) noexcept;
 template double Estimator<FullGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<FullGrid>::rate_sigma_ns() const noexcept;
 template double Estimator<FullGrid>::delay_sigma_ns() const noexcept;
@@ -226,7 +216,7 @@ template void Estimator<SmallGrid>::mix() noexcept;
 template void Estimator<SmallGrid>::follow_scale() noexcept;
 template void Estimator<SmallGrid>::adopt_shapes() noexcept;
 template void Estimator<SmallGrid>::doubt_delay() noexcept;
-template void Estimator<SmallGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
+template void Estimator<SmallGrid>::follow_surprise(const Innovations&) noexcept;
 template double Estimator<SmallGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<SmallGrid>::rate_sigma_ns() const noexcept;
 template double Estimator<SmallGrid>::delay_sigma_ns() const noexcept;
