@@ -179,7 +179,7 @@ double Estimator<Grid>::step(const Observation& seen) noexcept {
     hear_again(seen, outliers);
   }
   learn_noise(side, innovation, innovations);
-  if (count_ > kEvidenceFrom) follow_surprise(innovations);
+  if (count_ > kEvidenceFrom) follow_surprise(side, innovations);
   seek_second_opinion(seen, innovation);
   choose();
   mix();

@@ -104,8 +104,8 @@ class Estimator {
   [[nodiscard]] const Evidence<Grid>& evidence() const noexcept { return evidence_; }
   /// Honest standard deviation of the offset `cycles` after the last message,
   /// ns: what the filters believe, grown by the process noise that they cannot
-  /// exclude, widened while recent innovations are larger than believed, plus
-  /// what the shape of the delay noise leaves open.
+  /// exclude, what the last message shows beyond noise, and what the shape of the
+  /// delay noise leaves open.
   [[nodiscard]] double offset_sigma_ns(double cycles) const noexcept;
   /// Of the rate, ns per cycle, and of the path delay, ns, at the last message.
   [[nodiscard]] double rate_sigma_ns() const noexcept;
@@ -159,7 +159,7 @@ class Estimator {
   [[nodiscard]] bool observable() const noexcept;
   /// The path delay is estimated, not given or pinned.
   [[nodiscard]] bool delay_free() const noexcept { return two_way() && !known_delay().known(); }
-  void follow_surprise(const Innovations& innovations) noexcept;
+  void follow_surprise(std::size_t side, const Innovations& innovations) noexcept;
   [[nodiscard]] double floor_doubt_ns() const noexcept;
 
   KnownDelay known_delay_{};

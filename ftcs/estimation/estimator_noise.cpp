@@ -159,11 +159,13 @@ void Estimator<Grid>::doubt_delay() noexcept {
 }
 
 /// What the noise does not explain of the last message's innovation the clock may have done since
-/// the one before: max(0, nu^2 - 4 S), ns^2, as far as the message is no outlier.
+/// the one before: max(0, c nu^2 - 4 S), ns^2, c the probability that it is no outlier. (Where
+/// messages queue one that is late has waited.)
 template <class Grid>
-void Estimator<Grid>::follow_surprise(const Innovations& innovations) noexcept {
-  const double normalised = innovations.credit[best_] * innovations.distance[best_];
-  unexplained_ = std::max(0.0, normalised - kUsual) * innovations.variance[best_];
+void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
+  const bool waited = shape_[side].tail > 0.0 && innovations.centred[best_] > 0.0;
+  const double square = innovations.credit[best_] * innovations.distance[best_];
+  unexplained_ = waited ? 0.0 : std::max(0.0, square - kUsual) * innovations.variance[best_];
 }
 
 /// Where the floor of a queueing delay lies is known to a few per cent of its
@@ -207,7 +209,7 @@ template void Estimator<FullGrid>::mix() noexcept;
 template void Estimator<FullGrid>::follow_scale() noexcept;
 template void Estimator<FullGrid>::adopt_shapes() noexcept;
 template void Estimator<FullGrid>::doubt_delay() noexcept;
-template void Estimator<FullGrid>::follow_surprise(const Innovations&) noexcept;
+template void Estimator<FullGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
 template double Estimator<FullGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<FullGrid>::rate_sigma_ns() const noexcept;
 template double Estimator<FullGrid>::delay_sigma_ns() const noexcept;
@@ -216,7 +218,7 @@ template void Estimator<SmallGrid>::mix() noexcept;
 template void Estimator<SmallGrid>::follow_scale() noexcept;
 template void Estimator<SmallGrid>::adopt_shapes() noexcept;
 template void Estimator<SmallGrid>::doubt_delay() noexcept;
-template void Estimator<SmallGrid>::follow_surprise(const Innovations&) noexcept;
+template void Estimator<SmallGrid>::follow_surprise(std::size_t, const Innovations&) noexcept;
 template double Estimator<SmallGrid>::offset_sigma_ns(double) const noexcept;
 template double Estimator<SmallGrid>::rate_sigma_ns() const noexcept;
 template double Estimator<SmallGrid>::delay_sigma_ns() const noexcept;

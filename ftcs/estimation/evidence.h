@@ -88,7 +88,7 @@ class Evidence {
   /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean for each
   /// model that is calmer, sum one. Which of two models that explain the messages alike is right
   /// cannot be told, and the calmer one is the better bet for the mean; the deviation answers for
-  /// the other. (The one that stands for several of the full bank answers for its neighbour.)
+  /// the other. (The floor's calmest stands for several, and weighs as its neighbour does.)
   static void lean(const Row& weight, Row& leaning) noexcept {
     V sum{};
     for (std::size_t i = 0; i < kSize; i += kStep) {
@@ -158,7 +158,8 @@ class Evidence {
   static constexpr Row kLeaning = []() constexpr {
     Row row{};
     row[0] = Grid::kCalmFavour > 0.0 ? kLean : 1.0;
-    for (std::size_t i = 1; i < kSize; ++i) row[i] = i == 1 ? kLean : kLean * row[i - 1];
+    row[1] = kLean;
+    for (std::size_t i = 2; i < kSize; ++i) row[i] = kLean * row[i - 1];
     return row;
   }
   ();

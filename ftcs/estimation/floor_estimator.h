@@ -22,7 +22,7 @@ namespace ftcs::estimation {
 ///
 ///     p(nu) = w N(nu; 0, S) + (1 - w) T(nu)       nu > 0
 ///             early (nu < 0) an error of any size, hardly ever, in place of the waits
-///     credit c = w N / p,   slope c nu / S,   curvature c / S
+///     credit c = w N / p,   slope c nu / S,   curvature: judge()
 ///
 /// While w is not tiny this reaches the filter that knows which messages
 /// waited: near the floor T is flat and thin, so that a message there is

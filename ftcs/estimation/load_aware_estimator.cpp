@@ -88,9 +88,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const auto like_last = static_cast<double>(floor_.testimony().like_last);
   const double waits = lost_in_burst ? like_last : kLeastExponent;
   const double better = plain_.log_density() - std::max(floor_.log_density(), waits);
-  // A message that is where both say tells their noise apart, not them. (Where they say different
-  // things, and one of the last few was early for the floor, it is hardly where that says.)
-  const bool tells = finer || std::min(credit, own) < 0.5 || floor_.early_lately();
+  // A message that is where both say tells their noise apart, not them. (One that is at the floor
+  // with a probability of a half or three quarters is not where that says.)
+  const bool tells = finer || credit < 0.5 || own < kNearlyAll;
   const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
   // Where they differ by no more than a vague picture may it is open whether they do: what was
   // gathered is lost little by little.
