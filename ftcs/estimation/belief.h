@@ -21,6 +21,7 @@ inline constexpr double kCertain = 20.0;      ///< 5e8
 inline constexpr double kBeyondDoubt = 40.0;  ///< whatever the model of it is worth
 
 /// Normalised innovations squared, nu^2 / S.
+inline constexpr double kTwoSigma = 4.0;
 inline constexpr double kThreeSigma = 9.0;
 inline constexpr double kFarOff = 20.0;  ///< four and a half sigma: once in 300,000 messages
 inline constexpr double kEightSigma = 64.0;

@@ -11,8 +11,6 @@
 namespace ftcs::estimation {
 namespace {
 
-/// Normalised innovation squared up to which noise explains it: two sigma.
-constexpr double kUsual = 4.0;
 /// The sharpest shape tried has a normal part of a seventh of the tail. Where
 /// that is the best shape the true edge is anything between that soft and as
 /// sharp as can be, and then the filter puts the floor 5.4 % of the tail too
@@ -165,7 +163,7 @@ template <class Grid>
 void Estimator<Grid>::follow_surprise(std::size_t side, const Innovations& innovations) noexcept {
   const bool waited = shape_[side].tail > 0.0 && innovations.centred[best_] > 0.0;
   const double square = innovations.credit[best_] * innovations.distance[best_];
-  unexplained_ = waited ? 0.0 : std::max(0.0, square - kUsual) * innovations.variance[best_];
+  unexplained_ = waited ? 0.0 : std::max(0.0, square - kTwoSigma) * innovations.variance[best_];
 }
 
 /// Where the floor of a queueing delay lies is known to a few per cent of its

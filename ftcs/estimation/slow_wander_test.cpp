@@ -2,17 +2,18 @@
 // World: an oscillator whose wander is about as slow as what the messages so far can tell from none
 // at all; normal noise, two messages a cycle. Oracle: the truth. What is stated must hold there
 // too: a filter that bets on a calm oscillator is off by more than it says.
-#include <array>
 #include <cmath>
-#include <memory>
+#include <cstdio>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "ftcs/estimation/load_aware_estimator.h"
+#include "test/support/stated_deviation.h"
 
 namespace ftcs::estimation {
 namespace {
+
+using test::StatedDeviation;
 
 constexpr double kNoise = 100.0;
 constexpr int kSeeds = 24;
@@ -45,40 +46,34 @@ class Oscillator {
   double y_ = 20'000.0;
 };
 
-/// Share of the errors within 1, 2 and 3 of the stated deviations.
-std::array<double, 3> within(const World& world) {
-  std::array<double, 3> inside{};
+StatedDeviation after(const World& world) {
+  StatedDeviation stated;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     Oscillator oscillator(world, static_cast<std::uint64_t>(seed));
-    const auto estimator = std::make_unique<LoadAwareEstimator<FullGrid>>();
+    stated.begin();
     for (int i = 0; i < world.to; ++i) {
       const double x = oscillator.elapse(0.5);
-      const double sign = i % 2 == 0 ? 1.0 : -1.0;
-      const double delay = 10'000.0 + kNoise * oscillator.gaussian();
-      (void)estimator->update({.sign = sign, .elapsed = 0.5, .z = x + sign * delay});
-      if (i < world.from) continue;
-      const double error = std::abs(estimator->estimate().x - x) / estimator->offset_sigma_ns(0.0);
-      for (std::size_t k = 0; k < 3; ++k) inside[k] += error < static_cast<double>(k + 1) ? 1 : 0;
+      stated.hear(i, x, 10'000.0 + kNoise * oscillator.gaussian());
+      if (i >= world.from) stated.count(x);
     }
   }
-  for (double& share : inside) share /= kSeeds * (world.to - world.from);
-  return inside;
+  return stated;
 }
 
 TEST(SlowWander, what_is_stated_holds_where_the_wander_is_too_slow_to_be_seen) {
   for (const World& world : {World{0.0, 1e-8, 800, 2000}, World{0.0, 1e-7, 200, 1600},
                              World{0.0, 1e-6, 200, 800}, World{1e-4, 0.0, 800, 4000}}) {
-    const auto share = within(world);
-    std::printf("a %g, b %g: %.1f %.1f %.2f %%\n", world.white_fm, world.random_walk_fm,
-                100.0 * share[0], 100.0 * share[1], 100.0 * share[2]);
-    EXPECT_GT(share[0], 0.64) << world.white_fm << ' ' << world.random_walk_fm;
-    EXPECT_GT(share[2], 0.99) << world.white_fm << ' ' << world.random_walk_fm;
+    const StatedDeviation stated = after(world);
+    std::printf("a %g, b %g, ", world.white_fm, world.random_walk_fm);
+    stated.print("inside");
+    EXPECT_GT(stated.within(1), 0.64) << world.white_fm << ' ' << world.random_walk_fm;
+    EXPECT_GT(stated.within(3), 0.99) << world.white_fm << ' ' << world.random_walk_fm;
   }
 }
 
 // The price: no wander at all looks just the same.
 TEST(SlowWander, of_a_calm_oscillator_it_is_wide_but_not_by_half) {
-  EXPECT_LT(within({0.0, 0.0, 800, 2000})[0], 0.92);
+  EXPECT_LT(after({0.0, 0.0, 800, 2000}).within(1), 0.92);
 }
 
 }  // namespace
