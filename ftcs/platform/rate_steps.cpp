@@ -21,15 +21,19 @@ constexpr double kBurstNs = 25e6;
 constexpr double kShortestNs = 5e6;
 // A command that stays away from where the models are good for so long has moved.
 constexpr double kLongestOutsideNs = 1e9;
-// Corrections until what is expected is worth anything, and from then on until it is judged.
-constexpr int kSettling = 100;
-constexpr int kFewest = 100;
+// Corrections until what is expected is worth anything, from then on until a reading may count as
+// wrong, and until it is judged. A wrong reading that is believed bends what every model expects of
+// the hundred that follow, and one of 1400 models always has a step that bends it back.
+constexpr int kSettling = 50;
+constexpr int kTrusting = 10;
+constexpr int kFewest = 150;
 constexpr int kMemory = 200;
 // Models that have none; the second one's v is what the commands make up for.
 constexpr std::size_t kDriftCompensated = 1;
 constexpr std::size_t kWithoutSteps = 2;
 constexpr double kUsualTimeNs = 1e9;
 constexpr double kFarBetter = 0.5;
+constexpr double kBetter = 0.8;
 // Nobody reads a clock more finely.
 constexpr double kResolutionNs = 0.5;
 constexpr double kOutlier = 5.0;  // mean deviations: four standard deviations
@@ -132,7 +136,7 @@ void RateStepMeter::correct(double command) noexcept {
 
 // A reading that was interrupted counts no more than this.
 double RateStepMeter::largest_error_ns(const Model& model) const noexcept {
-  if (corrections_ < kSettling + kFewest) return std::numeric_limits<double>::infinity();
+  if (corrections_ < kSettling + kTrusting) return std::numeric_limits<double>::infinity();
   return kOutlier * (model.surprise_ns + kResolutionNs);
 }
 
@@ -145,14 +149,16 @@ void RateStepMeter::note_surprise(Model& model, double error_ns) const noexcept 
 void RateStepMeter::choose() noexcept {
   if (corrections_ < kSettling + kFewest) return;
   const auto best = std::ranges::min_element(models_, {}, &Model::surprise_ns);
-  const auto is_far_better_than = [best](const Model& other) {
-    return best->surprise_ns + kResolutionNs < kFarBetter * (other.surprise_ns + kResolutionNs);
+  const auto is_better_than = [best](const Model& other, double share) {
+    return best->surprise_ns + kResolutionNs < share * (other.surprise_ns + kResolutionNs);
   };
   const auto index = static_cast<std::size_t>(best - models_.begin());
-  if (!is_far_better_than(models_[believed_])) return;
+  const bool has_steps = believed_ >= kWithoutSteps;
   if (index < kWithoutSteps) {
-    believed_ = 0;
-  } else if (is_far_better_than(models_[0]) && is_far_better_than(models_[kDriftCompensated])) {
+    if (is_better_than(models_[believed_], kFarBetter)) believed_ = 0;
+  } else if (has_steps ? is_better_than(models_[believed_], kBetter)
+                       : is_better_than(models_[0], kFarBetter) &&
+                             is_better_than(models_[kDriftCompensated], kFarBetter)) {
     believed_ = index;
   }
 }
