@@ -92,12 +92,9 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   // with a probability of a half or three quarters is not where that says.)
   const bool tells = finer || credit < 0.5 || own < kNearlyAll;
   const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
-  // Where they differ by no more than a vague picture may it is open whether they do: what was
-  // gathered is lost little by little.
-  const double kept = noise < soon ? std::max(0.0, contest_ - kHint) : 0.0;
-  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : kept;
+  contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
   // An early message did not wait. A vague picture may lead while the floor finds by how much the
-  // clock has jumped, which that does better; a sharp one ends it.
+  // clock has jumped, which that does better.
   const bool early = own < 0.5 && !floor_.testimony().late;
   if (early && vague && contest_ > kCertain) doubt_floor();
   // One that was begun since a direction came late, and a message of the other is early: the clock
@@ -113,9 +110,8 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const bool dry = floor_.dry(floor_.recent() ? kHint : kConvincing);
   const bool one_way = kFarLarger * floor_.scale() < noise && floor_.seen_one_way();
   const bool unseen = dry && !one_way && (believed_ || !floor_.seeks_jump());
-  const bool ended = early && !vague;
-  const bool disproven = ended || finer || unseen || (believed_ && young);
-  if (contest_ > enough && (credit > 0.5 || ended) && disproven) floor_.unlock();
+  const bool disproven = finer || unseen || (believed_ && young);
+  if (contest_ > enough && credit > 0.5 && disproven) floor_.unlock();
 }
 
 /// It answers no more until it has convinced again.
