@@ -33,7 +33,7 @@ constexpr std::size_t kDriftCompensated = 1;
 constexpr std::size_t kWithoutSteps = 2;
 constexpr double kUsualTimeNs = 1e9;
 constexpr double kFarBetter = 0.5;
-constexpr double kBetter = 0.8;
+constexpr double kBetter = 0.8;  // of two with steps
 // Nobody reads a clock more finely.
 constexpr double kResolutionNs = 0.5;
 constexpr double kOutlier = 5.0;  // mean deviations: four standard deviations
@@ -153,12 +153,11 @@ void RateStepMeter::choose() noexcept {
     return best->surprise_ns + kResolutionNs < share * (other.surprise_ns + kResolutionNs);
   };
   const auto index = static_cast<std::size_t>(best - models_.begin());
-  const bool has_steps = believed_ >= kWithoutSteps;
+  const bool both_have_steps = index >= kWithoutSteps && believed_ != 0;
+  if (!is_better_than(models_[believed_], both_have_steps ? kBetter : kFarBetter)) return;
   if (index < kWithoutSteps) {
-    if (is_better_than(models_[believed_], kFarBetter)) believed_ = 0;
-  } else if (has_steps ? is_better_than(models_[believed_], kBetter)
-                       : is_better_than(models_[0], kFarBetter) &&
-                             is_better_than(models_[kDriftCompensated], kFarBetter)) {
+    believed_ = 0;
+  } else if (both_have_steps || is_better_than(models_[kDriftCompensated], kFarBetter)) {
     believed_ = index;
   }
 }

@@ -31,6 +31,7 @@ struct RateSteps {
 /// would make of the command c and c. A filter of second order follows v with the same gains in
 /// each model, and in one of a clock that keeps to its commands (q = 0). The model whose next
 /// readings come as expected, on average far better than in the one without steps, is believed.
+/// One with steps that is better by a fifth then replaces it.
 /// Nothing is learnt from a clock that keeps to its commands, nor where the steps make less than
 /// readings are uncertain by.
 ///

@@ -104,7 +104,7 @@ TEST(RateStepMeter, learns_them_from_noisy_readings_some_of_which_are_late) {
   int learnt = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     World world(119.209e-9, 10.0, seed);
-    world.late_reading = 0.01;
+    world.late_reading = 0.001;
     world.run(120);
     if (unreliability(world) < 40e-9) ++learnt;
   }
