@@ -16,18 +16,19 @@ namespace {
 constexpr double kBelieved = 25.0;
 constexpr double kMost = kBeyondDoubt + kCertain;
 
-/// As the mean of its models says, without what it adds to what it states.
-template <class Picture>
-double bare_sigma_ns(const Picture& plain) noexcept {
-  return plain.scale() * std::sqrt(std::max(0.0, plain.estimate().xx));
-}
-
 }  // namespace
 
 /// Of one message by the first picture, or of what it believes, if that is worse.
 template <class Grid>
 double LoadAwareEstimator<Grid>::plain_noise_ns() const noexcept {
   return std::max(plain_.spread_ns(), plain_.offset_sigma_ns(0.0));
+}
+
+/// What the first picture knows of the offset as the mean of its models says, without what it adds
+/// to what it states.
+template <class Grid>
+double LoadAwareEstimator<Grid>::bare_sigma_ns() const noexcept {
+  return plain_.scale() * std::sqrt(std::max(0.0, plain_.estimate().xx));
 }
 
 /// By how much the two differ in the offset, so many cycles from now.
@@ -52,7 +53,7 @@ template <class Grid>
 bool LoadAwareEstimator<Grid>::agree() const noexcept {
   const double apart = apart_ns();
   const double floor = floor_.offset_sigma_ns(0.0);
-  return bare_sigma_ns(plain_) < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
+  return bare_sigma_ns() < 2.0 * floor && apart * apart < kFiveSigma2 * floor * floor;
 }
 
 /// Messages at such a floor would arrive before they were sent, by more than latencies of stamps
@@ -121,27 +122,22 @@ void LoadAwareEstimator<Grid>::doubt_floor() noexcept {
   lead_ = recent_lead_ = kCertain;
 }
 
-/// A floor has been found. One that has far more noise than the first picture is none. One that
-/// contradicts what both believed so far, among messages from before, has to convince first.
-/// True: both say the same, and the first one knows it.
+/// A floor has been found. One that has far more noise than the first picture is none. True: both
+/// say the same, and the first one knows it.
 template <class Grid>
 bool LoadAwareEstimator<Grid>::welcome() noexcept {
   contest_ = 0.0;
   const double noise = plain_noise_ns();
-  const double much = kMuch * noise;
-  if (much < floor_.scale()) {
+  if (kMuch * noise < floor_.scale()) {
     floor_.unlock();
     return false;
   }
-  const bool agreed = agree();
   // All models of a few messages leave more open than the first picture does, even one that is
   // lost.
-  const bool known = agreed && bare_sigma_ns(plain_) < 2.0 * floor_.likeliest_sigma_ns();
+  const bool known = agree() && bare_sigma_ns() < 2.0 * floor_.likeliest_sigma_ns();
   if (known) floor_.take_from(plain_.bank(), plain_.evidence(), plain_.scale());
-  const double apart = apart_ns();
-  const bool contradicts = together_ && !agreed && much < apart;
-  if (!believed_ || contradicts) doubt_floor();
-  together_ = apart < noise;
+  if (!believed_) doubt_floor();
+  together_ = apart_ns() < noise;
   return known;
 }
 

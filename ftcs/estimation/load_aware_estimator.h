@@ -86,6 +86,7 @@ class LoadAwareEstimator {
  private:
   void forget_floor() noexcept;
   [[nodiscard]] double plain_noise_ns() const noexcept;
+  [[nodiscard]] double bare_sigma_ns() const noexcept;
   [[nodiscard]] double apart_ns(double ahead = 0.0) const noexcept;
   [[nodiscard]] double believed_credit(double own) const noexcept;
   [[nodiscard]] double give_up(const Observation& seen) noexcept;
