@@ -64,6 +64,7 @@ bench: deps-test
 	@cmake --preset release > /dev/null
 	@cmake --build build-release -j $(JOBS)
 	@build-release/bin/ftcs_bench
+	@build-release/bin/message_bench
 	@build-release/bin/analysis_bench
 	@build-release/bin/sim_bench
 	@bench/instructions.sh build-release

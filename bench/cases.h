@@ -24,13 +24,16 @@ namespace ftcs::bench {
 /// A reference and an oscillator that is 50 ppm fast, seen every 125 ms with some 100 ns of
 /// bell-shaped jitter, each direction its own: what a servo in steady state is given. Integer
 /// arithmetic: its few instructions are part of every figure, and `input_alone` says how much that
-/// is.
+/// is. With a load a message finds a frame of 120 us on its way that often, each way, and waits for
+/// what is left of it.
 class World {
  public:
+  explicit World(unsigned load_percent = 0) noexcept : load_percent_{load_percent} {}
+
   void next() noexcept {
     origin_ns_ += kIntervalNs;
-    const std::int64_t ahead = jitter();
-    back_ns_ = jitter();
+    const std::int64_t ahead = jitter() + wait();
+    back_ns_ = jitter() + wait();
     free_running_ns_ = origin_ns_ + origin_ns_ / 20'000;
     received_ns_ = free_running_ns_ + ahead;
     local_ns_ = origin_ns_ + kPathDelayNs + ahead;
@@ -61,6 +64,7 @@ class World {
   static constexpr std::int64_t kPathDelayNs = 10'000;
   static constexpr std::int64_t kLatencyNs = 30'000;
   static constexpr std::int64_t kTurnaroundNs = 1'000'000;
+  static constexpr std::uint32_t kFrameNs = 120'000;
 
   /// Sum of three bytes: mean zero, standard deviation 128 ns.
   std::int64_t jitter() noexcept {
@@ -70,12 +74,23 @@ class World {
     return static_cast<std::int64_t>(sum) - 382;
   }
 
+  /// 0 without a load, and no number is drawn.
+  std::int64_t wait() noexcept {
+    if (load_percent_ == 0) return 0;
+    wait_state_ = wait_state_ * 1664525U + 1013904223U;
+    if ((wait_state_ >> 16U) % 100U >= load_percent_) return 0;
+    wait_state_ = wait_state_ * 1664525U + 1013904223U;
+    return static_cast<std::int64_t>((wait_state_ >> 8U) % kFrameNs);
+  }
+
   std::int64_t origin_ns_ = 0;
   std::int64_t free_running_ns_ = 0;
   std::int64_t received_ns_ = 0;
   std::int64_t back_ns_ = 0;
   std::int64_t local_ns_ = 0;
   std::uint32_t jitter_state_ = 1;
+  std::uint32_t wait_state_ = 1;
+  unsigned load_percent_ = 0;
 };
 
 struct InputCase {
@@ -111,15 +126,21 @@ struct TwoWayCase {
 };
 
 /// One message, of alternating direction, into a whole servo.
-template <class Servo>
+template <class Servo, unsigned kLoadPercent = 0>
 struct MessageCase {
-  World world{};
+  World world{kLoadPercent};
   Servo servo{typename Servo::Config{}};
   bool forward = false;
   ServoUpdate step() noexcept {
+    prepare();
+    return update();
+  }
+  void prepare() noexcept {
     forward = !forward;
+    if (forward) world.next();
+  }
+  ServoUpdate update() noexcept {
     if (forward) {
-      world.next();
       return servo.update({Direction::kForward, world.origin(), world.local(), world.received()},
                           world.now());
     }
@@ -242,6 +263,8 @@ void for_each_case(const Visit& visit) {
   visit("pics_update", std::type_identity<LawCase<PicsServo>>{});
   visit("linuxptp_pi_update", std::type_identity<LawCase<LinuxptpPiServo>>{});
   visit("adaptive_message", std::type_identity<MessageCase<AdaptiveServo>>{});
+  visit("adaptive_message_load_40", std::type_identity<MessageCase<AdaptiveServo, 40>>{});
+  visit("adaptive_message_load_80", std::type_identity<MessageCase<AdaptiveServo, 80>>{});
   visit("small_adaptive_message", std::type_identity<MessageCase<SmallAdaptiveServo>>{});
   visit("kalman_message", std::type_identity<MessageCase<KalmanServo>>{});
   visit("regression_update", std::type_identity<LawCase<RegressionServo>>{});

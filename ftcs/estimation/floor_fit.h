@@ -3,6 +3,7 @@
 
 #include "ftcs/estimation/floor_record.h"
 #include "ftcs/estimation/model_bank.h"
+#include "ftcs/estimation/touching_lines.h"
 
 namespace ftcs::estimation {
 
@@ -63,12 +64,8 @@ struct FloorFit {
 /// messages that waited for nothing lie on one line in each direction, and
 /// nothing lies before it.
 ///
-/// 1. Candidates for the rate: the edges of the lower convex hulls of both
-///    directions (Andrew, Inf. Proc. Letters 9, 1979; for clocks: Moon, Skelly
-///    and Towsley, INFOCOM 1999).
-/// 2. For each, the messages' heights above both touching lines, by octaves:
-///    the best likelihood of a share that lies evenly within a width, and waits
-///    beyond it.
+/// 1. A rate at which lines touch both directions from below (touching_lines.h).
+/// 2. The same lines' messages above them: a first level, noise and mean wait.
 /// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line,
 ///    sigma, shares and one mean wait of both directions under FloorNoise, from the best candidate.
 /// 4. The same with a drift of the rate, since the oscillator wanders while a floor is looked for
@@ -79,7 +76,12 @@ struct FloorFit {
 ///    Mbit/s lie on one path. (The line is found before: two scales more let it settle anywhere.)
 ///
 /// `least_noise`: no sigma is smaller, ns. found is false where the windows
-/// hold too few messages, or no line is sharp enough.
+/// hold too few messages, or no line is sharp enough. Steps 1 and the others cost about as much, and
+/// may be done at two messages: `best` is then of a window that was a few messages older.
+[[nodiscard]] TouchingRate touch_floor(const PerDirection<RecordWindow>& windows,
+                                       double least_noise) noexcept;
+[[nodiscard]] FloorFit fit_floor(const PerDirection<RecordWindow>& windows,
+                                 const TouchingRate& best, double least_noise) noexcept;
 [[nodiscard]] FloorFit fit_floor(const PerDirection<RecordWindow>& windows,
                                  double least_noise) noexcept;
 
