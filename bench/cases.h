@@ -33,7 +33,8 @@ class World {
   void next() noexcept {
     origin_ns_ += kIntervalNs;
     const std::int64_t ahead = jitter() + wait();
-    back_ns_ = jitter() + wait();
+    back_ns_ = jitter();
+    back_wait_ns_ = wait();
     free_running_ns_ = origin_ns_ + origin_ns_ / 20'000;
     received_ns_ = free_running_ns_ + ahead;
     local_ns_ = origin_ns_ + kPathDelayNs + ahead;
@@ -55,7 +56,7 @@ class World {
   }
   [[nodiscard]] EventPair backward() const noexcept {
     return {Direction::kBackward,
-            ReferenceTime::from_ns(origin_ns_ + 2 * kPathDelayNs + kTurnaroundNs),
+            ReferenceTime::from_ns(origin_ns_ + 2 * kPathDelayNs + kTurnaroundNs + back_wait_ns_),
             FreeRunningTime::from_ns(free_running_ns_ + back_ns_ + kTurnaroundNs)};
   }
 
@@ -77,19 +78,26 @@ class World {
   /// 0 without a load, and no number is drawn.
   std::int64_t wait() noexcept {
     if (load_percent_ == 0) return 0;
-    wait_state_ = wait_state_ * 1664525U + 1013904223U;
-    if ((wait_state_ >> 16U) % 100U >= load_percent_) return 0;
-    wait_state_ = wait_state_ * 1664525U + 1013904223U;
-    return static_cast<std::int64_t>((wait_state_ >> 8U) % kFrameNs);
+    if (random() % 100U >= load_percent_) return 0;
+    return static_cast<std::int64_t>(random() % kFrameNs);
+  }
+
+  /// xorshift64 (Marsaglia, Journal of Statistical Software 8, 2003), its upper half.
+  std::uint32_t random() noexcept {
+    wait_state_ ^= wait_state_ << 13U;
+    wait_state_ ^= wait_state_ >> 7U;
+    wait_state_ ^= wait_state_ << 17U;
+    return static_cast<std::uint32_t>(wait_state_ >> 32U);
   }
 
   std::int64_t origin_ns_ = 0;
   std::int64_t free_running_ns_ = 0;
   std::int64_t received_ns_ = 0;
   std::int64_t back_ns_ = 0;
+  std::int64_t back_wait_ns_ = 0;
   std::int64_t local_ns_ = 0;
   std::uint32_t jitter_state_ = 1;
-  std::uint32_t wait_state_ = 1;
+  std::uint64_t wait_state_ = 88172645463325252ULL;
   unsigned load_percent_ = 0;
 };
 

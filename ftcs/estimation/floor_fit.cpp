@@ -2,7 +2,10 @@
 #include "ftcs/estimation/floor_fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
 
 #include "ftcs/estimation/belief.h"
@@ -14,7 +17,6 @@ namespace ftcs::estimation {
 namespace {
 
 constexpr int kRounds = 8;
-constexpr double kRootTwoPi = 2.5066282746310002;
 
 /// What a fit reads of the record.
 struct Gathered {
@@ -45,7 +47,8 @@ class Fit {
         messages_(all.messages),
         smallest_(all.smallest),
         best_(best),
-        lines_(touching_lines(all.messages, best.rate)) {}
+        lines_(touching_lines(all.messages, best.rate)),
+        without_floor_{without_floor(Direction::kForward), without_floor(Direction::kBackward)} {}
 
   [[nodiscard]] FloorFit run() noexcept {
     FloorFit fit;
@@ -98,28 +101,55 @@ class Fit {
     return true;
   }
 
+  /// Probabilities that the messages of one direction are at the floor, two at a time.
+  struct Credits {
+    std::array<double, FloorMessages::kCapacity> nu;
+    std::array<double, FloorMessages::kCapacity> credit;
+
+    Credits(const FloorFit& fit, Direction direction, const FloorMessages& of) noexcept {
+      // One later than this waited, whatever the shares, and costs no exponential.
+      const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
+      std::array<std::uint8_t, FloorMessages::kCapacity> near;
+      std::size_t count = 0;
+      for (std::size_t k = 0; k < of.size; ++k) {
+        nu[k] = innovation(fit, of, k);
+        credit[k] = 0.0;
+        if (!(nu[k] > latest)) near[count++] = static_cast<std::uint8_t>(k);
+      }
+      const FloorDensity noise(fit.noise[direction]);
+      for (std::size_t i = 0; i < count; i += 2) {
+        const std::size_t a = near[i];
+        const std::size_t b = near[std::min(i + 1, count - 1)];
+        Pair density{};
+        const Pair here = noise.at_floor<Pair>(Pair{nu[a], nu[b]}, density);
+        credit[a] = here[0];
+        credit[b] = here[1];
+      }
+    }
+  };
+
   /// Expectation: adds each message by the probability that it is at the floor. Their squares.
-  [[nodiscard]] double expect(FloorFit& fit, DriftSums& sums,
-                              PerDirection<Waits>& waits) const noexcept {
+  [[nodiscard]] double expect(FloorFit& fit, DriftSums& sums, PerDirection<Waits>& waits,
+                              bool drifts) const noexcept {
     double squares = 0.0;
-    // One later than this waited, whatever the shares, and costs no exponential.
-    const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
     for (const Direction direction : kDirections) {
       const FloorMessages& of = messages_[direction];
+      const Credits at(fit, direction, of);
       double members = 0.0;
       for (std::size_t k = 0; k < of.size; ++k) {
-        const double nu = innovation(fit, of, k);
-        if (nu > latest) {
-          waits[direction].messages += 1.0;
-          waits[direction].ns += nu;
-          continue;
+        const double nu = at.nu[k];
+        const double credit = at.credit[k];
+        if (credit > 0.0) {
+          // Relative to the line so far: small numbers, whose squares lose nothing.
+          const double left = of.sign * nu;
+          if (drifts) {
+            sums.add(of.sign, of.time(k), left, credit);
+          } else {
+            sums.line.add(of.sign, of.time(k), left, credit);
+          }
+          squares += credit * nu * nu;
+          members += credit;
         }
-        double density = 0.0;
-        const double credit = fit.noise[direction].at_floor(nu, density);
-        // Relative to the line so far: small numbers, whose squares lose nothing.
-        sums.add(of.sign, of.time(k), of.sign * nu, credit);
-        squares += credit * nu * nu;
-        members += credit;
         waits[direction].messages += 1.0 - credit;
         waits[direction].ns += (1.0 - credit) * std::max(nu, 0.0);
       }
@@ -134,7 +164,7 @@ class Fit {
   [[nodiscard]] bool improve(FloorFit& fit, PerDirection<Waits>& waits,
                              bool drifts) const noexcept {
     DriftSums sums;
-    const double squares = expect(fit, sums, waits);
+    const double squares = expect(fit, sums, waits, drifts);
     Estimate change;
     double drift = 0.0;
     const LineSums& line = sums.line;
@@ -213,29 +243,49 @@ class Fit {
     const RecordWindow& window = all_.windows[direction];
     const double young = std::min(messages_.forward.time(0), messages_.backward.time(0)) / 3.0;
     const auto size = static_cast<double>(of.size);
-    FloorNoise without{0.0, smallest_, 0.0};
-    for (std::size_t k = 0; k < of.size; ++k) without.mean_wait += above_touching_line(direction, k);
-    without.mean_wait = std::max(without.mean_wait / size, smallest_);
-    double members = 0.0, recent = 0.0, recent_all = 0.0, gained = 0.0;
-    for (std::size_t k = 0; k < of.size; ++k) {
-      double with_floor = 0.0;
-      double no_floor = 0.0;
-      const double credit =
-          fit.noise[direction].at_floor(innovation(fit, of, k), with_floor);
-      (void)without.at_floor(std::max(above_touching_line(direction, k), 1e-9), no_floor);
-      const double log_density = quick_log(with_floor);
-      gained += log_density - quick_log(no_floor);
-      fit.log_likelihood += window[k].said == 0.0F ? 0.0 : log_density;
+    const FloorDensity density(fit.noise[direction]);
+    double members = 0.0, recent = 0.0, recent_all = 0.0, explained = 0.0;
+    const auto add = [&](std::size_t k, double credit, double floor) {
+      explained += floor;
+      fit.log_likelihood += window[k].said == 0.0F ? 0.0 : floor;
       fit.said += static_cast<double>(window[k].said);
       members += credit;
-      if (of.time(k) <= young) continue;
+      if (of.time(k) <= young) return;
       recent += credit;
       recent_all += 1.0;
+    };
+    for (std::size_t k = 0; k < of.size; k += 2) {
+      const std::size_t next = std::min(k + 1, of.size - 1);
+      const Pair nu{innovation(fit, of, k), innovation(fit, of, next)};
+      Pair floor{};
+      const Pair credit = density.at_floor<Pair>(nu, floor);
+      floor = quick_log(floor);
+      add(k, credit[0], floor[0]);
+      if (next > k) add(next, credit[1], floor[1]);
     }
     fit.members[direction] = members;
     // A path that changed leaves its old floor behind: in the newest third there are fewer at it.
     lasting = lasting && recent >= kSmallPart * recent_all * members / size;
-    return gained;
+    return explained - without_floor_[direction];
+  }
+
+  /// ln likelihood of the messages of one direction, all of which waited.
+  [[nodiscard]] double without_floor(Direction direction) const noexcept {
+    const FloorMessages& of = messages_[direction];
+    double mean = 0.0;
+    for (std::size_t k = 0; k < of.size; ++k) mean += above_touching_line(direction, k);
+    mean = std::max(mean / static_cast<double>(of.size), smallest_);
+    const FloorDensity density({0.0, smallest_, mean});
+    double explained = 0.0;
+    for (std::size_t k = 0; k < of.size; k += 2) {
+      const std::size_t next = std::min(k + 1, of.size - 1);
+      const Pair above{above_touching_line(direction, k), above_touching_line(direction, next)};
+      Pair none{};
+      (void)density.at_floor<Pair>(larger<Pair>(above, Pair{} + 1e-9), none);
+      none = quick_log(none);
+      explained += next > k ? none[0] + none[1] : none[0];
+    }
+    return explained;
   }
 
   [[nodiscard]] double above_touching_line(Direction direction, std::size_t k) const noexcept {
@@ -247,26 +297,13 @@ class Fit {
   double smallest_;
   TouchingRate best_;
   TouchingLines lines_;
+  PerDirection<double> without_floor_;
 };
-
-bool too_few(const PerDirection<RecordWindow>& windows) noexcept {
-  return std::min(windows.forward.size, windows.backward.size) < kRepeated;
-}
 
 }  // namespace
 
 double FloorNoise::at_floor(double nu, double& density) const noexcept {
-  const double ratio = nu / sigma;
-  const double exponent = std::max(-0.5 * ratio * ratio, kLeastExponent);
-  const double normal = share * quick_exp(exponent) / (sigma * kRootTwoPi);
-  double other = kHardlyEver / any_size(nu, sigma);
-  if (nu > 0.0) {
-    const double exponential = quick_exp(std::max(-nu / mean_wait, kLeastExponent)) / mean_wait;
-    const double unknown = 1.0 / std::max(any_size(nu, sigma), kLogRange * kSmallPart * mean_wait);
-    other = (1.0 - share) * ((1.0 - kUnlikely) * exponential + kUnlikely * unknown);
-  }
-  density = normal + other;
-  return normal / density;
+  return FloorDensity(*this).at_floor(nu, density);
 }
 
 double FloorFit::offset_sigma_ns() const noexcept { return sigma() * std::sqrt(estimate.xx); }
@@ -275,21 +312,8 @@ bool FloorFit::clear(Direction direction) const noexcept {
   return noise[direction].share > kNearlyAll;
 }
 
-TouchingRate touch_floor(const PerDirection<RecordWindow>& windows, double least_noise) noexcept {
-  if (too_few(windows)) return {};
-  const Gathered all(windows, least_noise);
-  return best_touching_rate(all.messages, all.smallest);
-}
-
-FloorFit fit_floor(const PerDirection<RecordWindow>& windows, const TouchingRate& best,
-                   double least_noise) noexcept {
-  if (!(best.width > 0.0) || too_few(windows)) return {};
-  const Gathered all(windows, least_noise);
-  return Fit(all, best).run();
-}
-
 FloorFit fit_floor(const PerDirection<RecordWindow>& windows, double least_noise) noexcept {
-  if (too_few(windows)) return {};
+  if (std::min(windows.forward.size, windows.backward.size) < kRepeated) return {};
   const Gathered all(windows, least_noise);
   const TouchingRate best = best_touching_rate(all.messages, all.smallest);
   if (!(best.width > 0.0)) return {};
