@@ -197,4 +197,7 @@ class FloorRecord {
   std::uint8_t stride_ = 1;
 };
 
+/// No fit reads more messages of a direction.
+using LongestRecord = FloorRecord<128>;
+
 }  // namespace ftcs::estimation

@@ -21,7 +21,7 @@ namespace ftcs::estimation {
 /// one.
 class FloorSearch {
  public:
-  using Record = FloorRecord<128>;
+  using Record = LongestRecord;
   using Recent = FloorRecord<64>;
 
   /// What the filters that follow a floor already know, and how sure a new one

@@ -11,7 +11,7 @@ namespace ftcs::estimation {
 
 /// Messages of one window of the record, oldest first, side by side where a fit reads them often.
 struct FloorMessages {
-  static constexpr std::size_t kCapacity = 128;
+  static constexpr std::size_t kCapacity = LongestRecord::kCapacity;
   std::array<double, kCapacity> lifted;        ///< sign (z - base), ns
   std::array<std::int32_t, kCapacity> before;  ///< 1 / RecordWindow::kUnitsPerCycle cycles
   std::size_t size = 0;
