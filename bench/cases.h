@@ -75,7 +75,7 @@ class World {
     return static_cast<std::int64_t>(sum) - 382;
   }
 
-  /// 0 without a load, and no number is drawn.
+  /// ns; 0 without a load, and no number is drawn.
   std::int64_t wait() noexcept {
     if (load_percent_ == 0) return 0;
     if (random() % 100U >= load_percent_) return 0;

@@ -11,12 +11,51 @@
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/line_sums.h"
 #include "ftcs/estimation/quick_math.h"
+#include "ftcs/estimation/touching_lines.h"
 #include "ftcs/estimation/wait_density.h"
 
 namespace ftcs::estimation {
 namespace {
 
 constexpr int kRounds = 8;
+
+/// FloorNoise for many messages: what does not depend on them is computed once.
+class FloorDensity {
+ public:
+  explicit FloorDensity(const FloorNoise& noise) noexcept
+      : precision_(1.0 / noise.sigma),
+        height_(noise.share * precision_ / kRootTwoPi),
+        decay_(-1.0 / noise.mean_wait),
+        waits_(-(1.0 - noise.share) * (1.0 - kUnlikely) * decay_),
+        unknown_((1.0 - noise.share) * kUnlikely),
+        least_size_(kLogRange * kSmallPart * noise.mean_wait),
+        sigma_(noise.sigma) {}
+
+  /// V: one message, or a Pair.
+  template <class V>
+  [[nodiscard]] V at_floor(const V& nu, V& density) const noexcept {
+    const V least = V{} + kLeastExponent;
+    const V ratio = nu * precision_;
+    const V normal = height_ * quick_exp(larger<V>(-0.5 * ratio * ratio, least));
+    // (Of early ones nothing waits: any number may come out, and none is used.)
+    const V waits = waits_ * quick_exp(larger<V>(nu * decay_, least));
+    const V size = any_size<V>(nu, V{} + sigma_);
+    const V even = (nu > V{} ? V{} + unknown_ : V{} + kHardlyEver) /
+                   (nu > V{} ? larger<V>(size, V{} + least_size_) : size);
+    density = normal + (nu > V{} ? waits + even : even);
+    return normal / density;
+  }
+
+ private:
+  static constexpr double kRootTwoPi = 2.5066282746310002;
+  double precision_;   ///< 1/ns, one over sigma
+  double height_;      ///< 1/ns, of the normal part
+  double decay_;       ///< minus one over the mean wait, 1/ns
+  double waits_;       ///< 1/ns, their density at the floor
+  double unknown_;     ///< probability of a wait of any size
+  double least_size_;  ///< ns
+  double sigma_;       ///< ns
+};
 
 /// What a fit reads of the record.
 struct Gathered {
@@ -30,7 +69,7 @@ struct Gathered {
   }
   const PerDirection<RecordWindow>& windows;
   double smallest;  ///< ns, of noise
-  double base;
+  double base;      ///< ns, taken off all stamps: small numbers lose fewer digits
   PerDirection<FloorMessages> messages;
 };
 
@@ -40,19 +79,54 @@ struct Waits {
   double ns = 0.0;
 };
 
+/// Sums over messages of one direction at times t, cycles, of innovation nu, ns, and weight.
+template <class V>
+struct Moments {
+  V n{}, t{}, tt{}, ttt{}, tttt{}, nu{}, tnu{}, ttnu{};
+
+  void add(const V& time, const V& innovation, const V& weight, bool drifts) noexcept {
+    const V first = weight * time;
+    const V second = first * time;
+    n += weight;
+    t += first;
+    tt += second;
+    nu += weight * innovation;
+    tnu += first * innovation;
+    if (!drifts) return;
+    ttt += second * time;
+    tttt += second * time * time;
+    ttnu += second * innovation;
+  }
+
+  /// As messages of the line z = sign nu.
+  void add_to(DriftSums& sums, double sign) const noexcept {
+    sums.line.n += total(n);
+    sums.line.t += total(t);
+    sums.line.s += sign * total(n);
+    sums.line.tt += total(tt);
+    sums.line.ts += sign * total(t);
+    sums.line.z += sign * total(nu);
+    sums.line.tz += sign * total(tnu);
+    sums.line.sz += total(nu);
+    sums.ttt += total(ttt);
+    sums.tts += sign * total(tt);
+    sums.tttt += total(tttt);
+    sums.ttz += sign * total(ttnu);
+  }
+};
+
 class Fit {
  public:
-  Fit(const Gathered& all, const TouchingRate& best) noexcept
+  Fit(const Gathered& all, const TouchingLines& lines) noexcept
       : all_(all),
         messages_(all.messages),
         smallest_(all.smallest),
-        best_(best),
-        lines_(touching_lines(all.messages, best.rate)),
+        lines_(lines),
         without_floor_{without_floor(Direction::kForward), without_floor(Direction::kBackward)} {}
 
   [[nodiscard]] FloorFit run() noexcept {
     FloorFit fit;
-    fit.estimate.y = best_.rate;
+    fit.estimate.y = lines_.rate;
     fit.has_rate = true;
     start(fit);
     if (!settle(fit, false)) return fit;
@@ -69,7 +143,7 @@ class Fit {
 
  private:
   void start(FloorFit& fit) const noexcept {
-    const double sigma = std::max(smallest_, best_.width / 3.0);
+    const double sigma = std::max(smallest_, lines_.width / 3.0);
     const double wait = std::max(lines_.mean, smallest_);
     fit.noise = {{0.5, sigma, wait}, {0.5, sigma, wait}};
     fit.mean_wait = static_cast<float>(wait);
@@ -101,63 +175,63 @@ class Fit {
     return true;
   }
 
-  /// Probabilities that the messages of one direction are at the floor, two at a time.
-  struct Credits {
-    std::array<double, FloorMessages::kCapacity> nu;
-    std::array<double, FloorMessages::kCapacity> credit;
+  /// Messages of one direction that may be at the floor, an even number of places.
+  struct Near {
+    std::array<double, FloorMessages::kCapacity> nu;    ///< innovation, ns
+    std::array<double, FloorMessages::kCapacity> time;  ///< cycles, negative
+    std::size_t count = 0;
 
-    Credits(const FloorFit& fit, Direction direction, const FloorMessages& of) noexcept {
-      // One later than this waited, whatever the shares, and costs no exponential.
-      const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
-      std::array<std::uint8_t, FloorMessages::kCapacity> near;
-      std::size_t count = 0;
+    /// `latest`, ns: one later than this waited, whatever the shares, and costs no exponential.
+    Near(const FloorFit& fit, const FloorMessages& of, double latest, Waits& waits) noexcept {
       for (std::size_t k = 0; k < of.size; ++k) {
-        nu[k] = innovation(fit, of, k);
-        credit[k] = 0.0;
-        if (!(nu[k] > latest)) near[count++] = static_cast<std::uint8_t>(k);
+        const double ns = innovation(fit, of, k);
+        if (ns > latest) {
+          waits.messages += 1.0;
+          waits.ns += ns;
+          continue;
+        }
+        nu[count] = ns;
+        time[count++] = of.time(k);
       }
-      const FloorDensity noise(fit.noise[direction]);
-      for (std::size_t i = 0; i < count; i += 2) {
-        const std::size_t a = near[i];
-        const std::size_t b = near[std::min(i + 1, count - 1)];
-        Pair density{};
-        const Pair here = noise.at_floor<Pair>(Pair{nu[a], nu[b]}, density);
-        credit[a] = here[0];
-        credit[b] = here[1];
-      }
+      if (count % 2 == 0) return;
+      nu[count] = nu[count - 1];
+      time[count] = time[count - 1];
     }
   };
 
-  /// Expectation: adds each message by the probability that it is at the floor. Their squares.
-  [[nodiscard]] double expect(FloorFit& fit, DriftSums& sums, PerDirection<Waits>& waits,
-                              bool drifts) const noexcept {
-    double squares = 0.0;
+  /// Expectation: adds each message by the probability that it is at the floor, two at a time.
+  /// Innovations are relative to the line so far: small numbers, whose squares lose nothing.
+  /// Returns their sum of squares. (Kept apart: its tables would stand beside those of the fit.)
+  [[gnu::noinline]] [[nodiscard]] double expect(FloorFit& fit, DriftSums& sums,
+                                                PerDirection<Waits>& waits,
+                                                bool drifts) const noexcept {
+    Pair squares{};
+    const double latest = fit.sigma() * std::sqrt(2.0 * kBeyondDoubt);
     for (const Direction direction : kDirections) {
       const FloorMessages& of = messages_[direction];
-      const Credits at(fit, direction, of);
-      double members = 0.0;
-      for (std::size_t k = 0; k < of.size; ++k) {
-        const double nu = at.nu[k];
-        const double credit = at.credit[k];
-        if (credit > 0.0) {
-          // Relative to the line so far: small numbers, whose squares lose nothing.
-          const double left = of.sign * nu;
-          if (drifts) {
-            sums.add(of.sign, of.time(k), left, credit);
-          } else {
-            sums.line.add(of.sign, of.time(k), left, credit);
-          }
-          squares += credit * nu * nu;
-          members += credit;
-        }
-        waits[direction].messages += 1.0 - credit;
-        waits[direction].ns += (1.0 - credit) * std::max(nu, 0.0);
+      const Near near(fit, of, latest, waits[direction]);
+      const FloorDensity noise(fit.noise[direction]);
+      Moments<Pair> all;
+      Pair waited{};
+      Pair late{};
+      for (std::size_t i = 0; i < near.count; i += 2) {
+        const Pair there{1.0, i + 1 < near.count ? 1.0 : 0.0};
+        const Pair nu = load<Pair>(&near.nu[i]);
+        Pair density{};
+        const Pair credit = there * noise.at_floor<Pair>(nu, density);
+        all.add(load<Pair>(&near.time[i]), nu, credit, drifts);
+        squares += credit * nu * nu;
+        waited += there - credit;
+        late += (there - credit) * larger<Pair>(nu, Pair{});
       }
-      fit.members[direction] = members;
-      const double share = members / static_cast<double>(of.size);
+      waits[direction].messages += total(waited);
+      waits[direction].ns += total(late);
+      all.add_to(sums, of.sign);
+      fit.members[direction] = total(all.n);
+      const double share = fit.members[direction] / static_cast<double>(of.size);
       fit.noise[direction].share = std::clamp(share, 0.01, 0.99);
     }
-    return squares;
+    return total(squares);
   }
 
   /// One round of expectation and maximisation. False: nothing determines the line.
@@ -289,14 +363,13 @@ class Fit {
   }
 
   [[nodiscard]] double above_touching_line(Direction direction, std::size_t k) const noexcept {
-    return messages_[direction].height(k, best_.rate) - lines_.floor[direction];
+    return messages_[direction].height(k, lines_.rate) - lines_.floor[direction];
   }
 
   const Gathered& all_;
   const PerDirection<FloorMessages>& messages_;
   double smallest_;
-  TouchingRate best_;
-  TouchingLines lines_;
+  const TouchingLines& lines_;
   PerDirection<double> without_floor_;
 };
 
@@ -315,9 +388,9 @@ bool FloorFit::clear(Direction direction) const noexcept {
 FloorFit fit_floor(const PerDirection<RecordWindow>& windows, double least_noise) noexcept {
   if (std::min(windows.forward.size, windows.backward.size) < kRepeated) return {};
   const Gathered all(windows, least_noise);
-  const TouchingRate best = best_touching_rate(all.messages, all.smallest);
-  if (!(best.width > 0.0)) return {};
-  return Fit(all, best).run();
+  const TouchingLines lines = best_touching_lines(all.messages, all.smallest);
+  if (!(lines.width > 0.0)) return {};
+  return Fit(all, lines).run();
 }
 
 }  // namespace ftcs::estimation

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/floor_record.h"
 #include "ftcs/estimation/model_bank.h"
-#include "ftcs/estimation/quick_math.h"
-#include "ftcs/estimation/touching_lines.h"
 
 namespace ftcs::estimation {
 
@@ -24,43 +21,6 @@ struct FloorNoise {
 
   /// Probability that the message is at the floor; writes its density, 1/ns.
   [[nodiscard]] double at_floor(double nu, double& density) const noexcept;
-};
-
-/// The same for many messages: what does not depend on them is computed once.
-class FloorDensity {
- public:
-  explicit FloorDensity(const FloorNoise& noise) noexcept
-      : precision_(1.0 / noise.sigma),
-        height_(noise.share * precision_ / kRootTwoPi),
-        decay_(-1.0 / noise.mean_wait),
-        waits_(-(1.0 - noise.share) * (1.0 - kUnlikely) * decay_),
-        unknown_((1.0 - noise.share) * kUnlikely),
-        least_size_(kLogRange * kSmallPart * noise.mean_wait),
-        sigma_(noise.sigma) {}
-
-  /// V: one message, or a Pair.
-  template <class V>
-  [[nodiscard]] V at_floor(const V& nu, V& density) const noexcept {
-    const V least = V{} + kLeastExponent;
-    const V ratio = nu * precision_;
-    const V normal = height_ * quick_exp(larger<V>(-0.5 * ratio * ratio, least));
-    const V waits = waits_ * quick_exp(larger<V>(nu * decay_, least));
-    const V size = any_size<V>(nu, V{} + sigma_);
-    const V even = (nu > V{} ? V{} + unknown_ : V{} + kHardlyEver) /
-                   (nu > V{} ? larger<V>(size, V{} + least_size_) : size);
-    density = normal + (nu > V{} ? waits + even : even);
-    return normal / density;
-  }
-
- private:
-  static constexpr double kRootTwoPi = 2.5066282746310002;
-  double precision_;   ///< 1/ns, one over sigma
-  double height_;      ///< 1/ns, of the normal part
-  double decay_;       ///< 1/ns, of the waits
-  double waits_;       ///< 1/ns, their density at the floor
-  double unknown_;     ///< probability of a wait of any size
-  double least_size_;  ///< ns
-  double sigma_;       ///< ns
 };
 
 /// A line through the floor of both directions' delays.
@@ -103,8 +63,8 @@ struct FloorFit {
 /// messages that waited for nothing lie on one line in each direction, and
 /// nothing lies before it.
 ///
-/// 1. A rate at which lines touch both directions from below (touching_lines.h).
-/// 2. The same lines' messages above them: a first level, noise and mean wait.
+/// 1. Lines of one rate that touch both directions from below (touching_lines.h).
+/// 2. From the messages' heights above them a first level, noise and mean wait.
 /// 3. Expectation and maximisation (Dempster, Laird and Rubin, 1977) of line, sigma, shares and one
 ///    mean wait of both directions under FloorNoise.
 /// 4. The same with a drift of the rate, since the oscillator wanders while a floor is looked for

@@ -59,7 +59,7 @@ class Candidates {
         smallest_(smallest),
         total_(static_cast<double>(messages.forward.size + messages.backward.size)) {}
 
-  [[nodiscard]] TouchingRate best() noexcept {
+  [[nodiscard]] TouchingLines best() noexcept {
     for (const Direction direction : kDirections) try_edges(direction);
     return best_;
   }
@@ -86,26 +86,28 @@ class Candidates {
 
   void try_rate(double rate) noexcept {
     Counts count{};
-    double mean = 0.0;
-    double highest = 0.0;
+    TouchingLines lines{.rate = rate};
+    double highest = 0.0;  // mean of the direction in which it is larger
     for (const Direction direction : kDirections) {
       const FloorMessages& of = messages_[direction];
       const double least = hulls_[direction].touches(of, rate);
+      lines.floor[direction] = least;
       double sum = 0.0;
       for (std::size_t k = 0; k < of.size; ++k) {
-        const double above = of.height(k, rate) - least;
+        // By rounding one that is no corner may lie below the line.
+        const double above = std::max(0.0, of.height(k, rate) - least);
         sum += above;
         ++count[static_cast<std::size_t>(octave_of(above))];
       }
-      mean += sum / total_;
+      lines.mean += sum / total_;
       highest = std::max(highest, sum / static_cast<double>(of.size));
     }
-    score(count, rate, mean, highest);
+    score(count, lines, highest);
   }
 
   /// ln likelihood of the best width: `inside` messages evenly within it, the
   /// others log-uniform or exponential, whichever is likelier.
-  void score(const Counts& count, double rate, double mean, double highest) noexcept {
+  void score(const Counts& count, TouchingLines lines, double highest) noexcept {
     const double log_unit = quick_log(kLogRange * smallest_);
     const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
       return -((static_cast<double>(octave) - 0.5) * std::numbers::ln2 + log_unit);
@@ -126,13 +128,14 @@ class Candidates {
       const double rest = total_ - inside;
       double likelihood = inside * quick_log(inside / (total_ * width));
       if (rest > 0.0) {
-        const double wait = mean * total_ / rest;
+        const double wait = lines.mean * total_ / rest;
         const double exponential = -rest * (quick_log(wait) + 1.0);
         likelihood += rest * quick_log(rest / total_) + std::max(beyond, exponential);
       }
       if (likelihood > best_score_) {
         best_score_ = likelihood;
-        best_ = {rate, width};
+        lines.width = width;
+        best_ = lines;
       }
     }
   }
@@ -143,7 +146,7 @@ class Candidates {
   double total_;
   std::size_t tried_ = 0;
   double best_score_ = -1e299;
-  TouchingRate best_{};
+  TouchingLines best_{};
 };
 
 }  // namespace
@@ -158,25 +161,10 @@ void FloorMessages::read(Direction direction, const RecordWindow& window, double
   }
 }
 
-TouchingRate best_touching_rate(const PerDirection<FloorMessages>& messages,
-                                double smallest) noexcept {
+// Kept apart: its tables would stand beside those of the fit, in one frame beyond 4 KB.
+[[gnu::noinline]] TouchingLines best_touching_lines(const PerDirection<FloorMessages>& messages,
+                                                    double smallest) noexcept {
   return Candidates(messages, smallest).best();
-}
-
-TouchingLines touching_lines(const PerDirection<FloorMessages>& messages, double rate) noexcept {
-  TouchingLines lines;
-  const auto total = static_cast<double>(messages.forward.size + messages.backward.size);
-  for (const Direction direction : kDirections) {
-    const FloorMessages& of = messages[direction];
-    double least = of.height(0, rate);
-    for (std::size_t k = 1; k < of.size; ++k) least = std::min(least, of.height(k, rate));
-    double sum = 0.0;
-    for (std::size_t k = 0; k < of.size; ++k) sum += of.height(k, rate) - least;
-    lines.floor[direction] = least;
-    lines.mean += sum / total;
-    lines.highest = std::max(lines.highest, sum / static_cast<double>(of.size));
-  }
-  return lines;
 }
 
 }  // namespace ftcs::estimation

@@ -12,11 +12,12 @@ namespace ftcs::estimation {
 /// Messages of one window of the record, oldest first, side by side where a fit reads them often.
 struct FloorMessages {
   static constexpr std::size_t kCapacity = LongestRecord::kCapacity;
-  std::array<double, kCapacity> lifted;        ///< sign (z - base), ns
-  std::array<std::int32_t, kCapacity> before;  ///< 1 / RecordWindow::kUnitsPerCycle cycles
+  std::array<double, kCapacity> lifted{};        ///< sign (z - base), ns
+  std::array<std::int32_t, kCapacity> before{};  ///< 1 / RecordWindow::kUnitsPerCycle cycles
   std::size_t size = 0;
   double sign = 1.0;  ///< of the direction
 
+  /// Heights relative to `base`, ns; the window is one of the longest record, or shorter.
   void read(Direction direction, const RecordWindow& window, double base) noexcept;
   /// Cycles before the last message, negative.
   [[nodiscard]] double time(std::size_t k) const noexcept {
@@ -28,28 +29,22 @@ struct FloorMessages {
   }
 };
 
-/// The rate at which lines that touch both directions' messages from below separate messages at the
-/// floor from those that wait best, and the width of that floor.
-struct TouchingRate {
-  double rate = 0.0;   ///< ns per cycle
-  double width = 0.0;  ///< ns; 0: there is none
-};
-
-/// Lines of one rate that touch both directions from below.
+/// Lines of one rate that touch both directions' messages from below.
 struct TouchingLines {
+  double rate = 0.0;   ///< ns per cycle
+  double width = 0.0;  ///< ns above the lines, of messages at the floor; 0: there are none
   PerDirection<double> floor{};  ///< ns, the heights that they touch at
   double mean = 0.0;             ///< ns, of all messages above them
-  double highest = 0.0;          ///< the same, of the direction in which it is larger
 };
 
-/// Candidates are the edges of the lower convex hulls of both directions (Andrew, Inf. Proc.
-/// Letters 9, 1979; for clocks: Moon, Skelly and Towsley, INFOCOM 1999). For each, the messages'
-/// heights above both touching lines, by octaves above `smallest` ns: the best likelihood of a
-/// share that lies evenly within a width, and waits beyond it. At most 48 candidates; a window has
-/// one message of each direction at least.
-[[nodiscard]] TouchingRate best_touching_rate(const PerDirection<FloorMessages>& messages,
-                                              double smallest) noexcept;
-[[nodiscard]] TouchingLines touching_lines(const PerDirection<FloorMessages>& messages,
-                                           double rate) noexcept;
+/// Those that separate messages at the floor from those that wait best. Candidates for the rate are
+/// the edges of the lower convex hulls of both directions (Andrew, Inf. Proc. Letters 9, 1979; for
+/// clocks: Moon, Skelly and Towsley, INFOCOM 1999). For each, the messages' heights above both
+/// lines, by octaves above `smallest` ns: the best likelihood of a share that lies evenly within a
+/// width, and waits beyond it. At most 48 candidates. Each direction has a message at least; times
+/// never fall. `width` is 0 where no two messages of a direction are half a cycle apart, or fewer
+/// than six lie together.
+[[nodiscard]] TouchingLines best_touching_lines(const PerDirection<FloorMessages>& messages,
+                                                double smallest) noexcept;
 
 }  // namespace ftcs::estimation
