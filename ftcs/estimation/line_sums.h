@@ -72,15 +72,6 @@ struct DriftSums {
   LineSums line;
   double ttt = 0.0, tts = 0.0, tttt = 0.0, ttz = 0.0;
 
-  void add(double sign, double time, double reading, double weight = 1.0) noexcept {
-    line.add(sign, time, reading, weight);
-    const double square = weight * time * time;
-    ttt += square * time;
-    tts += square * sign;
-    tttt += square * time * time;
-    ttz += square * reading;
-  }
-
   /// All four. False: the messages do not determine them.
   [[nodiscard]] bool solve(Estimate& e, double& drift) const noexcept {
     LineSums square = line;

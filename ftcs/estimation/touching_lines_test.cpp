@@ -57,7 +57,8 @@ TEST(TouchingLines, touch_from_below) {
   for (const int size : {2, 6, 7, 128}) {
     for (int round = 0; round < 50; ++round) {
       std::vector<Message> all;
-      for (int k = 0; k < size; ++k) all.push_back({static_cast<double>((k + 1) / (round % 2 + 1)), wait(random)});
+      for (int k = 0; k < size; ++k)
+        all.push_back({static_cast<double>((k + 1) / (round % 2 + 1)), wait(random)});
       const auto messages = read(all, 100.0);
       const TouchingLines lines = best_touching_lines(messages, 1.0);
       if (!(lines.width > 0.0)) continue;
