@@ -21,10 +21,11 @@ std::string command_for(const std::string& name, const std::vector<std::string>&
   return ftcs::suggestion(name, commands);
 }
 
+bool is_option(const std::string& word) { return word.starts_with('-'); }
+
 /// What is left of the command line once everything that is known was taken from it.
 std::string unexpected(const CLI::App& app) {
   const std::vector<std::string> left = app.remaining(true);
-  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
   const auto option = std::find_if(left.begin(), left.end(), is_option);
   if (option == left.end()) return fmt::format("unexpected argument '{}'", left.front());
   std::vector<std::string> names;
@@ -71,7 +72,11 @@ int run(std::vector<std::string> words) {
     return app.exit(request);
   } catch (const CLI::Error& error) {
     const std::string program = has_command ? "ftcs " + name : "ftcs";
-    const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    // An option that is misspelt comes first: its value may have been taken for an argument, and
+    // what CLI11 then says is of that argument.
+    const std::vector<std::string> left = app.remaining(true);
+    const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
+                          std::any_of(left.begin(), left.end(), is_option);
     fmt::print(stderr, "{}: {} (see {} --help)\n", program,
                is_extra ? unexpected(app) : error.what(), program);
     return kUsageError;

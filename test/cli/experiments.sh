@@ -51,6 +51,8 @@ expect 2 'binary.toml' simulate binary.toml
 expect 2 'a scenario needs a [run] table' simulate empty.toml
 expect 2 'none.toml: cannot be read' simulate none.toml
 expect 1 'no scenario files' compare --suite none
+# What follows an option that is misspelt is no argument; the option is what is named.
+expect 2 "unknown option '--servoo'; did you mean '--servo'?" compare --suite networks --servoo adaptive
 for shard in 3/2 0/2 1/0 1 /2 1/ 1/2/3 -1/2 one/two; do
   expect 2 "simulate: --shard: expected i/n with 1 <= i <= n, got $shard" simulate good.toml --json part.json --shard=$shard
 done
