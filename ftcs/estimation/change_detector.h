@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/lanes.h"
@@ -38,35 +39,11 @@ class ChangeDetector {
   /// Bit i: model i may have been overtaken. Only then is take_over(i) worth
   /// asking.
   std::uint32_t add(const std::array<double, kSize>& log_density) noexcept {
-    std::array<float, kWidth> l{};
+    Densities l{};
     for (std::size_t j = 0; j < kWidth; ++j) {
       l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
     }
-    std::uint32_t overtaken = 0;
-    const Quad needed = Quad{} + static_cast<float>(kThreshold);
-    for (std::size_t i = 0; i < kRows; ++i) {
-      const float own = l[i];
-      float* const row = &sums_[kPlace[i]];
-      const auto advance = [row, &l, own](std::size_t j, const Quad& behind) {
-        const Quad sum =
-            larger<Quad>(Quad{}, load<Quad>(row + j) + (load<Quad>(&l[j]) + behind - own));
-        store(row + j, sum);
-        return sum;
-      };
-      std::size_t j = (i + 1) / kFour * kFour;
-      // Nothing of calmer models in the group of four where the wilder ones
-      // begin.
-      Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
-      Quad peak{};
-      if (j < kLast) {
-        peak = advance(j, behind);
-        behind = Quad{};
-        for (j += kFour; j < kLast; j += kFour) peak = larger<Quad>(peak, advance(j, behind));
-      }
-      peak = larger<Quad>(peak, advance(kLast, behind));
-      overtaken |= static_cast<std::uint32_t>(any(peak > needed)) << i;
-    }
-    return overtaken;
+    return add_rows(l, std::make_index_sequence<kRows>());
   }
 
   struct Takeover {
@@ -109,6 +86,32 @@ class ChangeDetector {
   void clear() noexcept { sums_ = {}; }
 
  private:
+  static constexpr std::size_t kFour = sizeof(Quad) / sizeof(float);
+  static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
+  using Densities = std::array<float, kWidth>;
+
+  template <std::size_t... i>
+  std::uint32_t add_rows(const Densities& l, std::index_sequence<i...>) noexcept {
+    return (0U | ... | (static_cast<std::uint32_t>(add_row<i>(l)) << i));
+  }
+  /// C_ij of all j; where they lie is known to the compiler. True: one is beyond the threshold.
+  template <std::size_t i>
+  bool add_row(const Densities& l) noexcept {
+    constexpr std::size_t kFirst = first_of(i);
+    const float own = l[i];
+    float* const row = &sums_[kPlace[i]];
+    // Nothing of calmer models in the group of four where the wilder ones begin.
+    Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
+    Quad peak{};
+    for (std::size_t j = kFirst; j < kWidth; j += kFour) {
+      const Quad sum =
+          larger<Quad>(Quad{}, load<Quad>(row + j) + (load<Quad>(&l[j]) + behind - own));
+      store(row + j, sum);
+      peak = larger<Quad>(peak, sum);
+      behind = Quad{};
+    }
+    return any(peak > Quad{} + static_cast<float>(kThreshold));
+  }
   [[nodiscard]] float sum(std::size_t i, std::size_t j) const noexcept {
     return sums_[kPlace[i] + j];
   }
@@ -133,8 +136,6 @@ class ChangeDetector {
   static constexpr double kSecond = 2.0;
   static constexpr std::size_t kSudden = Grid::kSudden;
 
-  static constexpr std::size_t kFour = sizeof(Quad) / sizeof(float);
-  static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
   static constexpr float kNever = -std::numeric_limits<float>::max();
   static constexpr std::size_t kLast = kWidth - kFour;  ///< the group of four that is never spared
   static_assert(kSize <= 32);

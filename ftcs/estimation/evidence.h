@@ -64,12 +64,10 @@ class Evidence {
     const double per_message = 1.0 / messages_;
     const V smallest = V{} + std::numeric_limits<double>::min();
     V lowest = V{} + std::numeric_limits<double>::max();
-    V place{};  // of the lowest cost in each lane
     for (std::size_t i = 0; i < kSize; i += kStep) {
       const V square = larger<V>(load<V>(&squares_[i]) * per_message, smallest);
       const V c = messages_ * quick_log(square) + load<V>(&logs_[i]) + load<V>(&kPlaceCost[i]);
       store(&cost[i], c);
-      place = c < lowest ? V{} + static_cast<double>(i) : place;
       lowest = lesser(lowest, c);
     }
     const double best_cost = least(lowest);
@@ -82,7 +80,9 @@ class Evidence {
       sum += w;
     }
     scale_to_one(weight, total(sum));
-    return lane_of(lowest, place, best_cost);
+    std::size_t heaviest = 0;
+    while (heaviest < kSize && cost[heaviest] != best_cost) ++heaviest;
+    return heaviest < kSize ? heaviest : 0;  // none if nothing can be compared
   }
 
   /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean for each
@@ -105,14 +105,6 @@ class Evidence {
   using V = typename LanesOf<kSize>::Type;
   static constexpr std::size_t kStep = kLanes<V>;
 
-  [[nodiscard]] static std::size_t lane_of(double, double place, double) noexcept {
-    return static_cast<std::size_t>(place);
-  }
-  [[nodiscard]] static std::size_t lane_of(const Pair& lowest, const Pair& place,
-                                           double best) noexcept {
-    const std::size_t first = static_cast<std::size_t>(place[0]);
-    return lowest[0] == best ? first : static_cast<std::size_t>(place[1]) + 1;
-  }
   static void scale_to_one(Row& weight, double sum) noexcept {
     const double share = 1.0 / sum;
     for (std::size_t i = 0; i < kSize; i += kStep) store(&weight[i], load<V>(&weight[i]) * share);

@@ -183,15 +183,14 @@ class Fit {
 
     /// `latest`, ns: one later than this waited, whatever the shares, and costs no exponential.
     Near(const FloorFit& fit, const FloorMessages& of, double latest, Waits& waits) noexcept {
-      for (std::size_t k = 0; k < of.size; ++k) {
+      for (std::size_t k = 0; k < of.size; ++k) {  // no branch that half of them take
         const double ns = innovation(fit, of, k);
-        if (ns > latest) {
-          waits.messages += 1.0;
-          waits.ns += ns;
-          continue;
-        }
+        const bool waited = ns > latest;
+        waits.messages += waited ? 1.0 : 0.0;
+        waits.ns += waited ? ns : 0.0;
         nu[count] = ns;
-        time[count++] = of.time(k);
+        time[count] = of.time(k);
+        count += waited ? 0U : 1U;
       }
       if (count % 2 == 0) return;
       nu[count] = nu[count - 1];

@@ -81,9 +81,7 @@ void JumpWatch::follow(const JumpMessage& message) noexcept {
 
 JumpWatch::Verdict JumpWatch::judge(double rival) const noexcept {
   const JumpHypothesis& best = leading();
-  if (!best.alive() || best.lead() <= 0.0 || best.lead() <= rival) {
-    return Verdict::kNothing;
-  }
+  if (!speaks() || best.lead() <= rival) return Verdict::kNothing;
   // What spoke for a jump of the delay may be from before the clock has jumped: the offset's has to
   // be plainly worse.
   const bool disputed = &best == &delay_ && best.lead() < offset_.lead() + kConvincing;

@@ -78,6 +78,8 @@ class JumpWatch {
   };
 
   void follow(const JumpMessage& message) noexcept;
+  /// Whether there is anything to judge: without it nothing is the verdict, whatever the rival.
+  [[nodiscard]] bool speaks() const noexcept { return leading().alive() && leading().lead() > 0.0; }
   /// `rival`: nats by which a change of rate explains better than none.
   [[nodiscard]] Verdict judge(double rival) const noexcept;
   [[nodiscard]] Estimate estimate() const noexcept { return leading().estimate(); }
@@ -101,6 +103,7 @@ class JumpWatch {
 class NoJumpWatch {
  public:
   void follow(const JumpMessage&) noexcept {}
+  [[nodiscard]] bool speaks() const noexcept { return false; }
   [[nodiscard]] JumpWatch::Verdict judge(double) const noexcept {
     return JumpWatch::Verdict::kNothing;
   }

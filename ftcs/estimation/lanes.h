@@ -6,6 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 namespace ftcs::estimation {
 
@@ -43,13 +47,21 @@ inline void store(Element* to, const V& v) noexcept {
   std::memcpy(static_cast<void*>(to), &v, sizeof v);
 }
 
-/// As std::min and std::max: the first if they are equal or not comparable.
+/// As std::min and std::max: the first if they are equal or not comparable. (So SSE2 has it in one
+/// instruction, with the second operand for the first; compilers do not find that.)
 template <class V>
 [[nodiscard]] inline V lesser(const V& a, const V& b) noexcept {
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<V, Pair>) return _mm_min_pd(b, a);
+#endif
   return b < a ? b : a;
 }
 template <class V>
 [[nodiscard]] inline V larger(const V& a, const V& b) noexcept {
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<V, Pair>) return _mm_max_pd(b, a);
+  if constexpr (std::is_same_v<V, Quad>) return _mm_max_ps(b, a);
+#endif
   return a < b ? b : a;
 }
 template <class V>
@@ -60,8 +72,12 @@ template <class V>
 /// Whether any lane of a comparison's result is set.
 template <class Mask>
 [[nodiscard]] inline bool any(const Mask& mask) noexcept {
+#if defined(__SSE2__)
+  return _mm_movemask_epi8(std::bit_cast<__m128i>(mask)) != 0;
+#else
   const auto halves = std::bit_cast<PairBits>(mask);
   return (halves[0] | halves[1]) != 0;
+#endif
 }
 
 [[nodiscard]] inline double root(double v) noexcept { return std::sqrt(v); }

@@ -161,21 +161,30 @@ typename SecondOpinion<Capacity>::Kept SecondOpinion<Capacity>::closest(
   return kept;
 }
 
-/// Size of the innovations of one direction. Typical is infinite for a
-/// direction that is not there, least is zero for one of few messages.
+/// Whether the typical innovation of one direction, their median, exceeds `limit`; so it does where
+/// there are none.
 template <std::size_t Capacity>
-typename SecondOpinion<Capacity>::Sizes SecondOpinion<Capacity>::innovations(
-    double sign) const noexcept {
-  std::array<double, Capacity> sizes{};
+bool SecondOpinion<Capacity>::typically_beyond(double sign, double limit) const noexcept {
   std::size_t count = 0;
-  double least = std::numeric_limits<double>::infinity();
+  std::size_t beyond = 0;
+  for (std::size_t k = 0; k < size_; ++k) {
+    const bool asked = messages_[k].sign == sign;
+    count += static_cast<std::size_t>(asked);
+    beyond += static_cast<std::size_t>(asked && std::abs(messages_[k].innovation) > limit);
+  }
+  return beyond >= count - count / 2;
+}
+
+/// Whether all innovations of one direction exceed `limit`, and they are not too few to tell.
+template <std::size_t Capacity>
+bool SecondOpinion<Capacity>::all_beyond(double sign, double limit) const noexcept {
+  std::size_t count = 0;
   for (std::size_t k = 0; k < size_; ++k) {
     if (messages_[k].sign != sign) continue;
-    const double size = std::abs(messages_[k].innovation);
-    sizes[count++] = size;
-    least = std::min(least, size);
+    if (!(std::abs(messages_[k].innovation) > limit)) return false;
+    ++count;
   }
-  return {ranked(sizes, count, count / 2), count < kRepeated ? 0.0 : least};
+  return count >= kRepeated;
 }
 
 /// Root mean square of what `line` leaves of the kept messages of one
@@ -221,13 +230,11 @@ double SecondOpinion<Capacity>::roughness(double sign) const noexcept {
 /// directions, or one that is merely loaded would do; or all of one direction.
 template <std::size_t Capacity>
 bool SecondOpinion<Capacity>::contradicted(double forward, double backward) const noexcept {
-  const Sizes ahead = innovations(1.0);
-  const Sizes back = innovations(-1.0);
   // Coarse stamps of one direction can agree to the digit: it must not set the
   // measure for itself.
   const double one_sided = kOneSided * std::max(forward, backward);
-  return (ahead.typical > forward && back.typical > backward) || ahead.least > one_sided ||
-         back.least > one_sided;
+  return (typically_beyond(1.0, forward) && typically_beyond(-1.0, backward)) ||
+         all_beyond(1.0, one_sided) || all_beyond(-1.0, one_sided);
 }
 
 template <std::size_t Capacity>
@@ -242,7 +249,9 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
   const auto rough = [&](double sign) {
     return worth * std::max(question.least_noise, roughness(sign));
   };
-  if (!contradicted(rough(1.0), rough(-1.0))) return result;
+  const double forward = rough(1.0);
+  if (!typically_beyond(1.0, forward) && !all_beyond(-1.0, kOneSided * forward)) return result;
+  if (!contradicted(forward, rough(-1.0))) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;
   double best = -1.0;
   Kept best_kept;

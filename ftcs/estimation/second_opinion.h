@@ -84,11 +84,8 @@ class SecondOpinion {
   [[nodiscard]] Estimate through(std::size_t a, std::size_t b, bool delay_free,
                                  double known_delay) const noexcept;
   [[nodiscard]] Kept closest(const Estimate& line) const noexcept;
-  struct Sizes {
-    double typical = 0.0;
-    double least = 0.0;
-  };
-  [[nodiscard]] Sizes innovations(double sign) const noexcept;
+  [[nodiscard]] bool typically_beyond(double sign, double limit) const noexcept;
+  [[nodiscard]] bool all_beyond(double sign, double limit) const noexcept;
   [[nodiscard]] double left_by(const Estimate& line, const Kept& kept, double sign) const noexcept;
   [[nodiscard]] double roughness(double sign) const noexcept;
   [[nodiscard]] bool contradicted(double forward, double backward) const noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -41,34 +42,27 @@ class SortedWindow {
   /// Upper median. Valid: size() > 0.
   [[nodiscard]] double median() const noexcept { return static_cast<double>(sorted_[size_ / 2]); }
 
-  /// Median distance from the median: the two runs left and right of the median
-  /// are merged from the inside outwards. Valid: size() > 0.
+  /// Median distance from the median. Of the distances a_1 <= .. <= a_k on its left and b_1 <= ..
+  /// <= b_k on its right the k smallest are the min(a_i, b_(k+1-i)) (Batcher's bitonic merge, AFIPS
+  /// 32, 1968); wanted is the largest of these. Valid: size() > 0.
   [[nodiscard]] double median_deviation() const noexcept {
-    const float centre = sorted_[size_ / 2];
-    std::size_t left = size_ / 2;       // next candidate on the left is left - 1
-    std::size_t right = size_ / 2 + 1;  // next candidate on the right
+    const std::size_t middle = size_ / 2;
+    const float centre = sorted_[middle];
     float distance = 0.0F;
-    for (std::size_t taken = 1; taken <= size_ / 2; ++taken) {
-      const bool take_left =
-          right >= size_ || (left > 0 && centre - sorted_[left - 1] < sorted_[right] - centre);
-      distance = take_left ? centre - sorted_[--left] : sorted_[right++] - centre;
+    for (std::size_t i = 0; i < middle; ++i) {
+      const std::size_t other = middle + 1U + i;  // the last one is not there if size is even
+      const float left = centre - sorted_[i];
+      const float nearer = other < size_ ? std::min(left, sorted_[other] - centre) : left;
+      distance = std::max(distance, nearer);
     }
     return static_cast<double>(distance);
   }
 
  private:
   [[nodiscard]] std::size_t position_of(float value) const noexcept {
-    std::size_t low = 0;
-    std::size_t high = size_;
-    while (low < high) {
-      const std::size_t middle = (low + high) / 2;
-      if (sorted_[middle] < value) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    return low;
+    std::size_t smaller = 0;  // counted, not sought: nothing here for a processor to guess
+    for (std::size_t i = 0; i < size_; ++i) smaller += static_cast<std::size_t>(sorted_[i] < value);
+    return smaller;
   }
 
   static_assert(Capacity >= 4 && Capacity < 256);

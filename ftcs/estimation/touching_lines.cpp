@@ -78,10 +78,12 @@ class Candidates {
     }
   }
 
-  [[nodiscard]] int octave_of(double height) const noexcept {
-    if (!(height > smallest_)) return 0;
-    const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(height / smallest_) >> 52U);
-    return std::min(kOctaves - 1, exponent - 1022);
+  /// Of two heights above zero.
+  [[nodiscard]] PairBits octaves_of(const Pair& heights) const noexcept {
+    constexpr double kLast = 1ULL << (kOctaves - 2);  // all beyond are of the last octave
+    const auto higher = std::bit_cast<PairBits>(heights > Pair{} + smallest_);
+    const Pair ratio = lesser<Pair>(heights / smallest_, Pair{} + kLast);
+    return ((std::bit_cast<PairBits>(ratio) >> 52U) - 1022U) & higher;
   }
 
   void try_rate(double rate) noexcept {
@@ -93,11 +95,15 @@ class Candidates {
       const double least = hulls_[direction].touches(of, rate);
       lines.floor[direction] = least;
       double sum = 0.0;
-      for (std::size_t k = 0; k < of.size; ++k) {
+      for (std::size_t k = 0; k < of.size; k += 2) {
         // By rounding one that is no corner may lie below the line.
-        const double above = std::max(0.0, of.height(k, rate) - least);
-        sum += above;
-        ++count[static_cast<std::size_t>(octave_of(above))];
+        const Pair above = larger<Pair>(Pair{}, of.heights(k, rate) - least);
+        const PairBits octave = octaves_of(above);
+        sum += above[0];
+        ++count[octave[0]];
+        if (k + 1 == of.size) break;
+        sum += above[1];
+        ++count[octave[1]];
       }
       lines.mean += sum / total_;
       highest = std::max(highest, sum / static_cast<double>(of.size));
@@ -112,11 +118,13 @@ class Candidates {
     const auto unknown = [&](int octave) {  // ln density of a log-uniform wait
       return -((static_cast<double>(octave) - 0.5) * std::numbers::ln2 + log_unit);
     };
+    int end = kOctaves;  // nothing lies above
+    while (end > 1 && count[static_cast<std::size_t>(end - 1)] == 0) --end;
     double beyond = 0.0;
-    for (int b = 1; b < kOctaves; ++b) beyond += count[static_cast<std::size_t>(b)] * unknown(b);
+    for (int b = 1; b < end; ++b) beyond += count[static_cast<std::size_t>(b)] * unknown(b);
     double inside = 0.0;
     double width = smallest_;
-    for (int b = 0; b < kOctaves; ++b) {
+    for (int b = 0; b < end; ++b) {
       const double here = count[static_cast<std::size_t>(b)];
       inside += here;
       if (b > 0) {

@@ -6,12 +6,14 @@
 #include <cstdint>
 
 #include "ftcs/estimation/floor_record.h"
+#include "ftcs/estimation/lanes.h"
 
 namespace ftcs::estimation {
 
 /// Messages of one window of the record, oldest first, side by side where a fit reads them often.
 struct FloorMessages {
   static constexpr std::size_t kCapacity = LongestRecord::kCapacity;
+  static_assert(kCapacity % 2 == 0);
   std::array<double, kCapacity> lifted{};        ///< sign (z - base), ns
   std::array<std::int32_t, kCapacity> before{};  ///< 1 / RecordWindow::kUnitsPerCycle cycles
   std::size_t size = 0;
@@ -26,6 +28,11 @@ struct FloorMessages {
   /// Above sign x + sign y t + d = 0, at the rate y in ns per cycle.
   [[nodiscard]] double height(std::size_t k, double rate) const noexcept {
     return lifted[k] - sign * rate * time(k);
+  }
+  /// Of the messages k and k + 1; k even. One beyond the last has any height.
+  [[nodiscard]] Pair heights(std::size_t k, double rate) const noexcept {
+    const Pair times{time(k), time(k + 1)};
+    return load<Pair>(&lifted[k]) - sign * rate * times;
   }
 };
 
