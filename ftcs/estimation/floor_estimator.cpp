@@ -143,6 +143,24 @@ bool FloorEstimator::shows_in_early(const Estimate& after) const noexcept {
   return dry(kSure) || 2.0 * static_cast<double>(early_by_) > std::abs(jump);
 }
 
+/// One that takes the last one back before that was confirmed: both directions have a lower floor.
+/// Where waits are whole fragments, one that is early here and one that waited for one more
+/// fragment there look like a jump. (Not if messages would arrive there before they were sent: that
+/// clock was put back.)
+Estimate FloorEstimator::after_jump() noexcept {
+  Estimate after = jumps_.estimate();
+  const double jump = after.x - bank_.estimate(best_).x;
+  const double size = std::abs(jump);
+  const bool possible = after.d - size / 2.0 > -early_arrival();
+  const bool undone = possible && std::abs(jump + static_cast<double>(jumped_)) < kSharp * size;
+  jumped_ = undone ? 0.0F : static_cast<float>(jump);
+  if (undone) {
+    after.x -= jump / 2.0;
+    after.d -= size / 2.0;
+  }
+  return after;
+}
+
 /// The clock has changed, it seems.
 void FloorEstimator::expect_confirmation() noexcept {
   for (const Direction each : kDirections) {
@@ -157,6 +175,7 @@ void FloorEstimator::confirm(Path& path) noexcept {
   if (path.unseen == 0) return;
   --path.unseen;
   if (paths_.forward.unseen + paths_.backward.unseen > 0) return;
+  jumped_ = 0.0F;
   search_.restart();
 }
 
@@ -175,7 +194,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   const bool shows = jump == JumpWatch::Verdict::kJumped && shows_in_early(jumps_.estimate());
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (shows) {
-    bank_.start(jumps_.estimate());
+    bank_.start(after_jump());
     detector_.clear();
     jumps_.clear();
     search_.alarm();

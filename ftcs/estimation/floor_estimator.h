@@ -166,6 +166,7 @@ class FloorEstimator {
   [[nodiscard]] Bank::Innovations judge(const Observation& seen, const Path& path) const noexcept;
   void watch_jumps(const Observation& seen, const Path& path, const Bank::Innovations& in) noexcept;
   [[nodiscard]] bool shows_in_early(const Estimate& after) const noexcept;
+  [[nodiscard]] Estimate after_jump() noexcept;
   void expect_confirmation() noexcept;
   void confirm(Path& path) noexcept;
   void detect_changes(const Bank::Innovations& in) noexcept;
@@ -200,6 +201,7 @@ class FloorEstimator {
   double mean_wait_ = 0.0;  ///< ns, when the floor was found
   int early_ = 0;           ///< messages for which an early one is remembered
   float early_by_ = 0.0F;   ///< ns, of the earliest that is remembered
+  float jumped_ = 0.0F;     ///< ns, by the last jump of the offset, until it is confirmed
   bool found_ = false;      ///< by a fit or by lucky messages, not begun where a path was settled
   bool locked_ = false;
   bool adopted_ = false;

@@ -30,7 +30,7 @@ void FloorEstimator::begin(double scale, double wait) noexcept {
   weight_[best_] = 1.0;
   count_ = kLately;
   early_ = 0;
-  early_by_ = 0.0F;
+  early_by_ = jumped_ = 0.0F;
   locked_ = adopted_ = true;
 }
 
