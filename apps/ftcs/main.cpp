@@ -23,9 +23,15 @@ std::string command_for(const std::string& name, const std::vector<std::string>&
 
 bool is_option(const std::string& word) { return word.starts_with('-'); }
 
+std::vector<std::string> left_over(const CLI::App& app) {
+  std::vector<std::string> left = app.remaining(true);
+  std::erase(left, "--");
+  return left;
+}
+
 /// What is left of the command line once everything that is known was taken from it.
 std::string unexpected(const CLI::App& app) {
-  const std::vector<std::string> left = app.remaining(true);
+  const std::vector<std::string> left = left_over(app);
   const auto option = std::find_if(left.begin(), left.end(), is_option);
   if (option == left.end()) return fmt::format("unexpected argument '{}'", left.front());
   std::vector<std::string> names;
@@ -74,7 +80,7 @@ int run(std::vector<std::string> words) {
     const std::string program = has_command ? "ftcs " + name : "ftcs";
     // An option that is misspelt comes first: its value may have been taken for an argument, and
     // what CLI11 then says is of that argument.
-    const std::vector<std::string> left = app.remaining(true);
+    const std::vector<std::string> left = left_over(app);
     const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
                           std::any_of(left.begin(), left.end(), is_option);
     fmt::print(stderr, "{}: {} (see {} --help)\n", program,

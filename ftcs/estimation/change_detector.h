@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <utility>
 
 #include "ftcs/estimation/belief.h"
 #include "ftcs/estimation/lanes.h"
@@ -43,7 +42,12 @@ class ChangeDetector {
     for (std::size_t j = 0; j < kWidth; ++j) {
       l[j] = j < kSize ? static_cast<float>(log_density[j]) : kNever;
     }
-    return add_rows(l, std::make_index_sequence<kRows>());
+    std::uint32_t overtaken = 0;
+#pragma GCC unroll 32  // where the rows lie is known then
+    for (std::size_t i = 0; i < kRows; ++i) {
+      overtaken |= static_cast<std::uint32_t>(add_row(i, l)) << i;
+    }
+    return overtaken;
   }
 
   struct Takeover {
@@ -90,20 +94,14 @@ class ChangeDetector {
   static constexpr std::size_t kWidth = (kSize + kFour - 1) / kFour * kFour;
   using Densities = std::array<float, kWidth>;
 
-  template <std::size_t... i>
-  std::uint32_t add_rows(const Densities& l, std::index_sequence<i...>) noexcept {
-    return (0U | ... | (static_cast<std::uint32_t>(add_row<i>(l)) << i));
-  }
-  /// C_ij of all j; where they lie is known to the compiler. True: one is beyond the threshold.
-  template <std::size_t i>
-  bool add_row(const Densities& l) noexcept {
-    constexpr std::size_t kFirst = first_of(i);
+  /// C_ij of all j. True: one is beyond the threshold.
+  bool add_row(std::size_t i, const Densities& l) noexcept {
     const float own = l[i];
     float* const row = &sums_[kPlace[i]];
     // Nothing of calmer models in the group of four where the wilder ones begin.
     Quad behind = load<Quad>(&kBehind[kFour - (i + 1) % kFour]);
     Quad peak{};
-    for (std::size_t j = kFirst; j < kWidth; j += kFour) {
+    for (std::size_t j = first_of(i); j < kWidth; j += kFour) {
       const Quad sum =
           larger<Quad>(Quad{}, load<Quad>(row + j) + (load<Quad>(&l[j]) + behind - own));
       store(row + j, sum);

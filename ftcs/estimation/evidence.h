@@ -82,7 +82,7 @@ class Evidence {
     scale_to_one(weight, total(sum));
     std::size_t heaviest = 0;
     while (heaviest < kSize && cost[heaviest] != best_cost) ++heaviest;
-    return heaviest < kSize ? heaviest : 0;  // none if nothing can be compared
+    return heaviest < kSize ? heaviest : 0;  // no cost is a number
   }
 
   /// Writes weights that lean to the wilder models, for the deviation: w_i times kLean for each

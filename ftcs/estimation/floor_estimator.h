@@ -201,7 +201,7 @@ class FloorEstimator {
   double mean_wait_ = 0.0;  ///< ns, when the floor was found
   int early_ = 0;           ///< messages for which an early one is remembered
   float early_by_ = 0.0F;   ///< ns, of the earliest that is remembered
-  float jumped_ = 0.0F;     ///< ns, by the last jump of the offset, until it is confirmed
+  float jumped_ = 0.0F;     ///< ns, offset that the last jump brought, until it is confirmed
   bool found_ = false;      ///< by a fit or by lucky messages, not begun where a path was settled
   bool locked_ = false;
   bool adopted_ = false;

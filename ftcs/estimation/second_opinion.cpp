@@ -250,6 +250,7 @@ FreshFit SecondOpinion<Capacity>::consult(const OpinionQuestion& question) const
     return worth * std::max(question.least_noise, roughness(sign));
   };
   const double forward = rough(1.0);
+  // Whatever the roughness of the other direction is: without one of these two nothing is.
   if (!typically_beyond(1.0, forward) && !all_beyond(-1.0, kOneSided * forward)) return result;
   if (!contradicted(forward, rough(-1.0))) return result;
   const std::size_t unknowns = delay_free ? 3 : 2;

@@ -78,7 +78,7 @@ class Candidates {
     }
   }
 
-  /// Of two heights above zero.
+  /// Of two heights, none below zero; the first one up to `smallest`, or of what is no number.
   [[nodiscard]] PairBits octaves_of(const Pair& heights) const noexcept {
     constexpr double kLast = 1ULL << (kOctaves - 2);  // all beyond are of the last octave
     const auto higher = std::bit_cast<PairBits>(heights > Pair{} + smallest_);
@@ -100,10 +100,10 @@ class Candidates {
         const Pair above = larger<Pair>(Pair{}, of.heights(k, rate) - least);
         const PairBits octave = octaves_of(above);
         sum += above[0];
-        ++count[octave[0]];
+        ++count[static_cast<std::size_t>(octave[0])];
         if (k + 1 == of.size) break;
         sum += above[1];
-        ++count[octave[1]];
+        ++count[static_cast<std::size_t>(octave[1])];
       }
       lines.mean += sum / total_;
       highest = std::max(highest, sum / static_cast<double>(of.size));

@@ -53,6 +53,7 @@ expect 2 'none.toml: cannot be read' simulate none.toml
 expect 1 'no scenario files' compare --suite none
 # What follows an option that is misspelt is no argument; the option is what is named.
 expect 2 "unknown option '--servoo'; did you mean '--servo'?" compare --suite networks --servoo adaptive
+expect 2 '--seeds: Value x not in range' compare --seeds x -- good.toml
 for shard in 3/2 0/2 1/0 1 /2 1/ 1/2/3 -1/2 one/two; do
   expect 2 "simulate: --shard: expected i/n with 1 <= i <= n, got $shard" simulate good.toml --json part.json --shard=$shard
 done
