@@ -260,7 +260,10 @@ void LoadAwareEstimator<Grid>::follow_lead(Direction direction, bool explains) n
   // and what the next burst does to the first picture is not followed.
   const bool harmless =
       believed_ && together_ && kFarLarger * plain_noise_ns() < floor_.mean_wait();
-  const double least = harmless ? 0.0 : -kMost;
+  // One that has begun again in a burst of waits knows less than these: it foretells them by being
+  // vague.
+  const bool lost = believed_ && !plain_.settled() && plain_noise_ns() > floor_.mean_wait();
+  const double least = harmless || lost ? 0.0 : -kMost;
   const auto follow = [&](double& lead, double share) {
     const double density = share * said.at_floor + (early ? said.waiting : (1.0 - share) * waits);
     const double gained = std::clamp(quick_log(density / plain), -kConvincing, kConvincing);
