@@ -90,9 +90,8 @@ void LoadAwareEstimator<Grid>::compare(double credit, double own, bool anew) noe
   const double waits = lost_in_burst ? like_last : kLeastExponent;
   const double better = plain_.log_density() - std::max(floor_.log_density(), waits);
   // A message that is where both say tells their noise apart, not them. (One that is at the floor
-  // with a probability of a half or three quarters is not where that says.) Nor does one that the
-  // first picture cannot explain speak for it: that outliers may be of any size is no prediction.
-  const bool tells = finer || (credit >= 0.5 && own < kNearlyAll);
+  // with a probability of a half or three quarters is not where that says.)
+  const bool tells = finer || credit < 0.5 || own < kNearlyAll;
   const double gain = std::clamp(better, -kConvincing, tells ? kConvincing : 0.0);
   contest_ = contradicts ? std::max(anew ? kHint : 0.0, contest_ + gain) : 0.0;
   // An early message did not wait. A vague picture may lead while the floor finds by how much the
