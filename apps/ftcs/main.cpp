@@ -21,19 +21,17 @@ std::string command_for(const std::string& name, const std::vector<std::string>&
   return ftcs::suggestion(name, commands);
 }
 
-bool is_option(const std::string& word) { return word.starts_with('-'); }
-
-std::vector<std::string> left_over(const CLI::App& app) {
+/// What is wrong with the command line. An option that nobody knows comes first: its value may have
+/// been taken for an argument, and what CLI11 then says is of that argument.
+std::string complaint(const CLI::App& app, const CLI::Error& error) {
   std::vector<std::string> left = app.remaining(true);
   std::erase(left, "--");
-  return left;
-}
-
-/// What is left of the command line once everything that is known was taken from it.
-std::string unexpected(const CLI::App& app) {
-  const std::vector<std::string> left = left_over(app);
+  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
   const auto option = std::find_if(left.begin(), left.end(), is_option);
-  if (option == left.end()) return fmt::format("unexpected argument '{}'", left.front());
+  if (option == left.end()) {
+    const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    return is_extra ? fmt::format("unexpected argument '{}'", left.front()) : error.what();
+  }
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands()) {
     for (const CLI::Option* known : command->get_options()) {
@@ -78,13 +76,7 @@ int run(std::vector<std::string> words) {
     return app.exit(request);
   } catch (const CLI::Error& error) {
     const std::string program = has_command ? "ftcs " + name : "ftcs";
-    // An option that is misspelt comes first: its value may have been taken for an argument, and
-    // what CLI11 then says is of that argument.
-    const std::vector<std::string> left = left_over(app);
-    const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
-                          std::any_of(left.begin(), left.end(), is_option);
-    fmt::print(stderr, "{}: {} (see {} --help)\n", program,
-               is_extra ? unexpected(app) : error.what(), program);
+    fmt::print(stderr, "{}: {} (see {} --help)\n", program, complaint(app, error), program);
     return kUsageError;
   }
   return exit_code;

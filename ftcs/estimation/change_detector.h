@@ -77,7 +77,7 @@ class ChangeDetector {
     // chance, and costs a calm model all that it knew.
     const double needed = std::max(abrupt ? enough : std::max(enough, kSure), trust.least);
     if (sum(i, winner) <= static_cast<float>(needed)) return {};
-    for (std::size_t j = std::min(first_of(i), kLast); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
+    for (std::size_t j = first_of(i); j < kWidth; ++j) sums_[kPlace[i] + j] = 0.0F;
     return {winner, alone};
   }
 
@@ -135,7 +135,6 @@ class ChangeDetector {
   static constexpr std::size_t kSudden = Grid::kSudden;
 
   static constexpr float kNever = -std::numeric_limits<float>::max();
-  static constexpr std::size_t kLast = kWidth - kFour;  ///< the group of four that is never spared
   static_assert(kSize <= 32);
   /// Read from place 4 - n on it spares the first n of a group.
   static constexpr std::array<float, 2 * kFour> kBehind = {kNever, kNever, kNever, kNever,
@@ -145,13 +144,12 @@ class ChangeDetector {
     return (i + 1) / kFour * kFour;
   }
   /// sums_[kPlace[i] + j] is C_ij.
-  static constexpr std::array<std::uint16_t, kRows + 1> kPlace = []() constexpr {
-    std::array<std::uint16_t, kRows + 1> place{};
+  static constexpr std::array<std::uint16_t, kRows> kPlace = []() constexpr {
+    std::array<std::uint16_t, kRows> place{};
     std::size_t end = 0;
-    for (std::size_t i = 0; i <= kRows; ++i) {
-      const std::size_t first = first_of(i) < kLast ? first_of(i) : kLast;
-      place[i] = static_cast<std::uint16_t>(end - first);
-      end += kWidth - first;
+    for (std::size_t i = 0; i < kRows; ++i) {
+      place[i] = static_cast<std::uint16_t>(end - first_of(i));
+      end += kWidth - first_of(i);
     }
     return place;
   }

@@ -297,8 +297,7 @@ void Estimator<Grid>::start_again(const FreshFit& fit) noexcept {
 template <class Grid>
 void Estimator<Grid>::detect_changes(const Row& log_density, const ChangeTrust& trust) noexcept {
   const std::uint32_t overtaken = detector_.add(log_density);
-  const auto jump =
-      jumps_.speaks() ? jumps_.judge(detector_.lead(best_)) : JumpWatch::Verdict::kNothing;
+  const auto jump = jumps_.judge(detector_, best_);
   if (jump == JumpWatch::Verdict::kWait) return;
   if (jump == JumpWatch::Verdict::kJumped) {  // rate and noise are known as before
     begin_anew(jumps_.estimate());

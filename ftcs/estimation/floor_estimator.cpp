@@ -189,8 +189,7 @@ void FloorEstimator::detect_changes(const Bank::Innovations& in) noexcept {
   }
   if (early && in.credit[best_] < kUnlikely) search_.alarm();
   const std::uint32_t overtaken = detector_.add(in.log_density);
-  const auto jump =
-      jumps_.speaks() ? jumps_.judge(detector_.lead(best_)) : JumpWatch::Verdict::kNothing;
+  const auto jump = jumps_.judge(detector_, best_);
   const bool shows = jump == JumpWatch::Verdict::kJumped && shows_in_early(jumps_.estimate());
   if (jump == JumpWatch::Verdict::kJumped && !shows) jumps_.clear();
   if (shows) {

@@ -78,19 +78,22 @@ class JumpWatch {
   };
 
   void follow(const JumpMessage& message) noexcept;
-  /// Whether there is anything to judge: without it nothing is the verdict, whatever the rival.
-  [[nodiscard]] bool speaks() const noexcept { return leading().alive() && leading().lead() > 0.0; }
   /// `rival`: nats by which a change of rate explains better than none.
   [[nodiscard]] Verdict judge(double rival) const noexcept;
+  /// The rival is what `detector` says of the model `believed`; asked only where a jump explains
+  /// anything.
+  template <class Detector>
+  [[nodiscard]] Verdict judge(const Detector& detector, std::size_t believed) const noexcept {
+    return speaks() ? judge(detector.lead(believed)) : Verdict::kNothing;
+  }
   [[nodiscard]] Estimate estimate() const noexcept { return leading().estimate(); }
   /// A jump of the offset explains what is seen better than none, and no worse than one of the
   /// delay.
-  [[nodiscard]] bool seeks_offset() const noexcept {
-    return offset_.alive() && offset_.lead() > 0.0 && &leading() == &offset_;
-  }
+  [[nodiscard]] bool seeks_offset() const noexcept { return speaks() && &leading() == &offset_; }
   void clear() noexcept;
 
  private:
+  [[nodiscard]] bool speaks() const noexcept { return leading().alive() && leading().lead() > 0.0; }
   [[nodiscard]] const JumpHypothesis& leading() const noexcept {
     return delay_.lead() > offset_.lead() ? delay_ : offset_;
   }
@@ -103,8 +106,8 @@ class JumpWatch {
 class NoJumpWatch {
  public:
   void follow(const JumpMessage&) noexcept {}
-  [[nodiscard]] bool speaks() const noexcept { return false; }
-  [[nodiscard]] JumpWatch::Verdict judge(double) const noexcept {
+  template <class Detector>
+  [[nodiscard]] JumpWatch::Verdict judge(const Detector&, std::size_t) const noexcept {
     return JumpWatch::Verdict::kNothing;
   }
   [[nodiscard]] Estimate estimate() const noexcept { return {}; }
